@@ -1,0 +1,27 @@
+"""Spike patterns hidden in noise, as Gymnasium environments with the aggregate label as feedback.
+
+Importing this package registers `gnm/PatternTrial-v0` and `gnm/PatternStream-v0`.
+"""
+
+from gymnasium.envs.registration import register
+
+from gnm_env.stream_env import MAX_EPISODE_BINS, PatternStreamEnv
+from gnm_env.task import Patterns, Task
+from gnm_env.trial import Trial, draw_trial
+from gnm_env.trial_env import PatternTrialEnv
+
+__all__ = [
+    "PatternStreamEnv",
+    "PatternTrialEnv",
+    "Patterns",
+    "Task",
+    "Trial",
+    "draw_trial",
+]
+
+register("gnm/PatternTrial-v0", entry_point="gnm_env.trial_env:PatternTrialEnv")
+register(
+    "gnm/PatternStream-v0",
+    entry_point="gnm_env.stream_env:PatternStreamEnv",
+    max_episode_steps=MAX_EPISODE_BINS,
+)

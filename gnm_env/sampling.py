@@ -1,0 +1,252 @@
+"""Compiled draws: noise, an occurrence of a pattern, a whole trial, a piece of the endless stream.
+
+Everything is sparse. A raster is `channels` (int32, ascending within a bin) and `offsets` (int64):
+the spikes of bin t are channels[offsets[t] : offsets[t + 1]]. The functions append to buffers that
+they are given and return them, since a buffer that is too short is replaced by a longer one.
+
+The order of the draws is part of the interface: the environments and the compiled training loops
+share these functions, and so hear the same stream from the same generator.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from gnm_env.compiled import compiled
+from gnm_env.task import World
+
+PIECE_BINS = 2_048
+"""Most noise bins in one piece of the endless stream, so that memory stays bounded as q -> 0."""
+
+
+@compiled
+def grown(buffer: NDArray[Any], needed: int) -> NDArray[Any]:
+    """`buffer` if it holds `needed` entries, else a copy at least twice as long."""
+    if needed <= buffer.size:
+        return buffer
+    longer = np.empty(max(needed, 2 * buffer.size), buffer.dtype)
+    longer[: buffer.size] = buffer
+    return longer
+
+
+@compiled
+def append_noise(
+    rng: Generator,
+    world: World,
+    n_bins: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Append `n_bins` bins of noise, the first of them bin `bin_`. Each bit is Bernoulli(p)."""
+    offsets = grown(offsets, bin_ + n_bins + 1)
+    for t in range(bin_, bin_ + n_bins):
+        offsets[t + 1] = 0
+    position, n_events, done = -1, offsets[bin_], False
+    while not done:
+        position, n_events, done = _fill_noise(
+            rng, world, n_bins, channels, offsets, bin_, position, n_events
+        )
+        if not done:
+            channels = grown(channels, channels.size + 1)
+    _accumulate(offsets, bin_, n_bins)
+    return channels, offsets
+
+
+@compiled
+def _fill_noise(
+    rng: Generator,
+    world: World,
+    n_bins: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+    position: int,
+    n_events: int,
+) -> tuple[int, int, bool]:
+    """Add noise spikes until the end of the bins (True) or of the buffer (False).
+
+    The bits are taken in one row, bin by bin. The gap to the next 1 is geometric,
+    floor(exponential / −ln(1−p)), so that only the spikes cost a draw; `position` is the last 1.
+    Counts the spikes of bin t in offsets[t + 1].
+    """
+    n_inputs = np.uint64(world.n_inputs)
+    n_bits = n_bins * world.n_inputs
+    while n_events < channels.size:
+        gap = rng.standard_exponential() / world.hazard
+        # Written so that infinity and NaN (p = 0) end the noise as well.
+        if not gap < n_bits - position - 1:
+            return position, n_events, True
+        position += 1 + int(gap)
+        # Unsigned: a signed division that rounds down costs three times as much.
+        t = np.int64(np.uint64(position) // n_inputs)
+        channels[n_events] = position - t * world.n_inputs
+        offsets[bin_ + t + 1] += 1
+        n_events += 1
+    return position, n_events, False
+
+
+@compiled
+def _accumulate(offsets: NDArray[np.int64], bin_: int, n_bins: int) -> None:
+    """Turn counts per bin into offsets, from bin `bin_` on."""
+    total = offsets[bin_]
+    for t in range(bin_ + 1, bin_ + n_bins + 1):
+        total += offsets[t]
+        offsets[t] = total
+
+
+@compiled
+def append_pattern(
+    rng: Generator,
+    world: World,
+    class_: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Append one occurrence of pattern `class_`, its first bin being bin `bin_`."""
+    bins = world.pattern_bins
+    first = world.pattern_offsets[class_ * bins]
+    last = world.pattern_offsets[(class_ + 1) * bins]
+    offsets = grown(offsets, bin_ + bins + 1)
+    n_events = offsets[bin_]
+    channels = grown(channels, n_events + last - first)
+    if world.jitter_bins == 0 and world.deletion == 0.0:
+        for e in range(first, last):
+            channels[n_events + e - first] = world.pattern_channels[e]
+        for m in range(1, bins + 1):
+            offsets[bin_ + m] = n_events + world.pattern_offsets[class_ * bins + m] - first
+        return channels, offsets
+
+    cells = _noisy_cells(rng, world, class_)
+    offsets[bin_ + 1 : bin_ + bins + 1] = 0
+    for k in range(cells.size):
+        # Two spikes moved onto one cell are one spike: the raster stays binary.
+        if k > 0 and cells[k] == cells[k - 1]:
+            continue
+        m = cells[k] // world.n_inputs
+        channels[n_events] = cells[k] - m * world.n_inputs
+        n_events += 1
+        offsets[bin_ + m + 1] += 1
+    _accumulate(offsets, bin_, bins)
+    return channels, offsets
+
+
+@compiled
+def _noisy_cells(rng: Generator, world: World, class_: int) -> NDArray[np.int64]:
+    """Cells m·N + channel of the pattern's spikes after deletion and jitter, ascending."""
+    bins = world.pattern_bins
+    first = world.pattern_offsets[class_ * bins]
+    last = world.pattern_offsets[(class_ + 1) * bins]
+    cells = np.empty(last - first, np.int64)
+    kept = 0
+    for m in range(bins):
+        for e in range(
+            world.pattern_offsets[class_ * bins + m], world.pattern_offsets[class_ * bins + m + 1]
+        ):
+            if world.deletion > 0.0 and rng.random() < world.deletion:
+                continue
+            moved = m
+            if world.jitter_bins > 0:
+                moved += int(rng.random() * (2 * world.jitter_bins + 1)) - world.jitter_bins
+                moved = min(max(moved, 0), bins - 1)
+            cells[kept] = moved * world.n_inputs + world.pattern_channels[e]
+            kept += 1
+    return np.sort(cells[:kept])
+
+
+@compiled
+def append_trial(
+    rng: Generator,
+    world: World,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    bin_: int,
+    occurrence: int,
+) -> tuple[
+    NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int, int, int
+]:
+    """Append one trial, its first bin being bin `bin_`, its first occurrence number `occurrence`.
+
+    Onsets count from the trial's own first bin. Returns the four buffers, the bin and the number
+    of the occurrence that follow the trial's last, and the aggregate label.
+    """
+    # Where (background bin) and which (class), in one number: its order is the order in the trial.
+    n_occurrences = 0
+    keys = np.empty(4 * world.n_classes, np.int64)
+    label = 0
+    for class_ in range(world.n_classes):
+        count = rng.poisson(world.mean_occurrences)
+        label += count * world.targets[class_]
+        keys = grown(keys, n_occurrences + count)
+        for k in range(n_occurrences, n_occurrences + count):
+            keys[k] = int(rng.random() * world.background_bins) * world.n_classes + class_
+        n_occurrences += count
+    keys = np.sort(keys[:n_occurrences])
+
+    onsets = grown(onsets, occurrence + n_occurrences)
+    classes = grown(classes, occurrence + n_occurrences)
+    t = bin_
+    noise_done = 0
+    for k in range(n_occurrences):
+        before = keys[k] // world.n_classes
+        class_ = keys[k] - before * world.n_classes
+        if before > noise_done:
+            channels, offsets = append_noise(
+                rng, world, before - noise_done, channels, offsets, t
+            )
+            t += before - noise_done
+            noise_done = before
+        onsets[occurrence + k] = t - bin_
+        classes[occurrence + k] = class_
+        channels, offsets = append_pattern(rng, world, class_, channels, offsets, t)
+        t += world.pattern_bins
+    channels, offsets = append_noise(
+        rng, world, world.background_bins - noise_done, channels, offsets, t
+    )
+    t += world.background_bins - noise_done
+    return channels, offsets, onsets, classes, t, occurrence + n_occurrences, label
+
+
+@compiled
+def append_piece(
+    rng: Generator,
+    world: World,
+    noise_left: float,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> tuple[NDArray[np.int32], NDArray[np.int64], int, int, float]:
+    """Append the next piece of the endless stream: some noise, then a pattern if one is due.
+
+    `noise_left` is the state of the stream: noise bins still to come before the next pattern, or
+    −1 where that number is to be drawn (at the very beginning and after each pattern). Returns the
+    buffers, the number of noise bins in the piece, the class of the pattern that follows them
+    (−1: none yet) and the new `noise_left`.
+    """
+    if noise_left < 0:
+        noise_left = np.floor(rng.standard_exponential() / world.onset_hazard)
+        if not noise_left >= 0:  # 0 / 0: no pattern ever starts
+            noise_left = np.inf
+    if noise_left > PIECE_BINS:
+        channels, offsets = append_noise(rng, world, PIECE_BINS, channels, offsets, bin_)
+        return channels, offsets, PIECE_BINS, -1, noise_left - PIECE_BINS
+    n_noise = int(noise_left)
+    if n_noise > 0:
+        channels, offsets = append_noise(rng, world, n_noise, channels, offsets, bin_)
+    class_ = int(rng.random() * world.n_classes)
+    channels, offsets = append_pattern(rng, world, class_, channels, offsets, bin_ + n_noise)
+    return channels, offsets, n_noise, class_, -1.0
+
+
+def new_buffers() -> tuple[
+    NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
+]:
+    """Empty buffers for channels, offsets (offsets[0] = 0), onsets and classes."""
+    return np.empty(256, np.int32), np.zeros(512, np.int64), np.empty(8, np.int64), np.empty(8, np.int64)

@@ -1,0 +1,249 @@
+"""What is to be learned: the numbers of the task, and the fixed patterns that hide in the noise."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gnm_env.checks import real, whole
+
+MAX_MEAN_BINS = 100_000_000
+"""Longest mean trial that a Task accepts, in bins: beyond it a single draw would fill the memory."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """The numbers that define the stream of noise and patterns; time is counted in bins.
+
+    Raises ValueError if a field is out of range, naming the field, the value and the range.
+
+    Attributes:
+        n_inputs: N, number of input channels.
+        pattern_bins: M, length of a pattern in bins.
+        rate: p, probability of an input spike per channel and bin, in noise and in patterns alike.
+        n_classes: C, number of patterns, each a class of its own.
+        targets: output spikes owed per class, one whole number >= 0 each; 0 makes the class a
+            distractor. None means (1, 2, …, C).
+        background_bins: noise bins in a trial, into which the patterns are inserted.
+        mean_occurrences: mean of the Poisson number of occurrences per class and trial.
+        onset_probability: q, probability that a pattern starts, per noise bin of the endless stream.
+        jitter_bins: j; each spike of each occurrence is moved by an integer uniform on −j … j and
+            held at the pattern's first or last bin where that would carry it outside.
+        deletion: probability that a spike of an occurrence is dropped.
+    """
+
+    n_inputs: int = 100
+    pattern_bins: int = 50
+    rate: float = 0.005
+    n_classes: int = 1
+    targets: tuple[int, ...] | None = None
+    background_bins: int = 100
+    mean_occurrences: float = 2.0
+    onset_probability: float = 0.01
+    jitter_bins: int = 0
+    deletion: float = 0.0
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        for name in ("n_inputs", "pattern_bins", "n_classes", "background_bins"):
+            put(name, whole(name, getattr(self, name), low=1))
+        for name in ("rate", "onset_probability", "deletion"):
+            put(name, real(name, getattr(self, name), low=0.0, high=1.0))
+        put("mean_occurrences", real("mean_occurrences", self.mean_occurrences, low=0.0))
+        put("jitter_bins", whole("jitter_bins", self.jitter_bins, low=0))
+        put("targets", self._checked_targets())
+        mean_bins = self.background_bins + self.mean_pattern_bins
+        if mean_bins > MAX_MEAN_BINS:
+            raise ValueError(
+                f"a trial must have at most {MAX_MEAN_BINS:,} bins on average, got {mean_bins:,.0f}: "
+                "lower background_bins, pattern_bins, n_classes or mean_occurrences"
+            )
+
+    def _checked_targets(self) -> tuple[int, ...]:
+        targets = self.targets
+        if targets is None:
+            return tuple(range(1, self.n_classes + 1))
+        if isinstance(targets, str) or not isinstance(targets, Iterable):
+            raise ValueError(f"targets must be a sequence of whole numbers, got {targets!r}")
+        checked = tuple(whole(f"targets[{c}]", t, low=0) for c, t in enumerate(targets))
+        if len(checked) != self.n_classes:
+            raise ValueError(
+                f"targets must have one entry per class, n_classes = {self.n_classes}, "
+                f"got {len(checked)}: {checked}"
+            )
+        return checked
+
+    @property
+    def owed(self) -> tuple[int, ...]:
+        """Output spikes owed per class, shape (C,): `targets`, never None."""
+        assert self.targets is not None  # set in __post_init__
+        return self.targets
+
+    @property
+    def mean_pattern_bins(self) -> float:
+        """Mean number of bins of a trial that belong to patterns."""
+        return self.mean_occurrences * self.n_classes * self.pattern_bins
+
+    @property
+    def silent_score(self) -> float:
+        """Mean noisy performance, in bins, of a neuron that never spikes: (1−q)/q + M − 1.
+
+        It survives the noise before the first pattern and all but the last bin of that pattern.
+        Holds where every class owes a spike and before any cap; infinite at q = 0.
+        """
+        q = self.onset_probability
+        return (1.0 - q) / q + self.pattern_bins - 1 if q > 0 else float("inf")
+
+    @staticmethod
+    def from_keywords(task: Task | None, keywords: dict[str, Any]) -> Task:
+        """`task`, or the Task made of `keywords`; ValueError if both are given or a name is wrong."""
+        names = [field.name for field in fields(Task)]
+        unknown = sorted(set(keywords) - set(names))
+        if unknown:
+            raise ValueError(
+                f"unknown keyword {unknown[0]!r}: a Task has the fields {', '.join(names)}"
+            )
+        if task is None:
+            return Task(**keywords)
+        if keywords:
+            raise ValueError(
+                f"give either task or its fields as keywords, got task and {', '.join(keywords)}; "
+                "use dataclasses.replace(task, …) to change a field"
+            )
+        if not isinstance(task, Task):
+            raise ValueError(f"task must be a gnm_env.Task, got {type(task).__name__}")
+        return task
+
+
+@dataclass(frozen=True, eq=False)
+class Patterns:
+    """C fixed spatio-temporal patterns. Make them with `Patterns.draw` or `Patterns.from_dense`.
+
+    Attributes:
+        channels: int32 (events,), the channel of each spike; ascending within a bin.
+        offsets: int64 (C·M + 1,); the spikes of bin m of class c are
+            channels[offsets[c·M + m] : offsets[c·M + m + 1]].
+        shape: (C, M, N).
+    """
+
+    channels: NDArray[np.int32]
+    offsets: NDArray[np.int64]
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def draw(cls, task: Task, seed: int) -> Patterns:
+        """Draw patterns of `task` at random: each bit is 1 with probability `task.rate`.
+
+        The generator is default_rng((seed, 1)), so that equal seeds mean equal patterns everywhere
+        and a stream with the same seed shares no bits with them.
+        """
+        seed = whole("pattern seed", seed, low=0)
+        shape = (task.n_classes, task.pattern_bins, task.n_inputs)
+        return cls.from_dense(np.random.default_rng((seed, 1)).random(shape) < task.rate)
+
+    @classmethod
+    def from_dense(cls, array: ArrayLike) -> Patterns:
+        """Patterns from a binary array of shape (C, M, N); ValueError if it is anything else."""
+        bits = np.asarray(array)
+        if bits.ndim != 3 or 0 in bits.shape:
+            raise ValueError(
+                "patterns must have shape (classes, bins, channels) with no empty axis, "
+                f"got {bits.shape}"
+            )
+        channels, offsets = sparse(bits.reshape(-1, bits.shape[2]), "patterns")
+        for part in (channels, offsets):
+            part.flags.writeable = False
+        return cls(channels, offsets, bits.shape)
+
+    def dense(self) -> NDArray[np.bool_]:
+        """The patterns as a new bool array of shape (C, M, N)."""
+        n_classes, pattern_bins, n_inputs = self.shape
+        return dense(self.channels, self.offsets, n_inputs).reshape(self.shape)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Patterns):
+            return NotImplemented
+        return (
+            self.shape == other.shape
+            and np.array_equal(self.channels, other.channels)
+            and np.array_equal(self.offsets, other.offsets)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.shape, self.channels.tobytes(), self.offsets.tobytes()))
+
+
+def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Channels and offsets per bin of a binary raster (bins, channels); ValueError if not binary."""
+    raster = np.asarray(bits)
+    if raster.dtype != np.bool_:
+        if not np.issubdtype(raster.dtype, np.number) or not np.isin(raster, (0, 1)).all():
+            raise ValueError(f"{name} must be binary (0 and 1 only), got {raster.dtype} values")
+        raster = raster != 0
+    offsets = np.zeros(len(raster) + 1, np.int64)
+    np.cumsum(raster.sum(axis=1), out=offsets[1:])
+    return np.nonzero(raster)[1].astype(np.int32), offsets
+
+
+def dense(channels: NDArray[Any], offsets: NDArray[Any], n_inputs: int) -> NDArray[np.bool_]:
+    """The bool raster (bins, channels) of sparse events."""
+    raster = np.zeros((len(offsets) - 1, n_inputs), np.bool_)
+    raster[np.repeat(np.arange(len(raster)), np.diff(offsets)), channels] = True
+    return raster
+
+
+class World(NamedTuple):
+    """Task and patterns in the form in which compiled code takes them. Made by `world`."""
+
+    n_inputs: int
+    pattern_bins: int
+    background_bins: int
+    n_classes: int
+    jitter_bins: int
+    deletion: float
+    mean_occurrences: float
+    hazard: float
+    """−ln(1−p): a unit exponential over it, rounded down, is the geometric gap between spikes."""
+    onset_hazard: float
+    """−ln(1−q), likewise for the noise bins before a pattern of the endless stream."""
+    targets: NDArray[np.int64]
+    pattern_channels: NDArray[np.int32]
+    pattern_offsets: NDArray[np.int64]
+
+
+@functools.lru_cache(maxsize=64)
+def world(task: Task, patterns: Patterns) -> World:
+    """Task and patterns for compiled code; ValueError if they do not fit each other."""
+    expected = (task.n_classes, task.pattern_bins, task.n_inputs)
+    if not isinstance(patterns, Patterns):
+        raise ValueError(
+            f"patterns must be gnm_env.Patterns, got {type(patterns).__name__}; "
+            "use Patterns.from_dense(array)"
+        )
+    if patterns.shape != expected:
+        raise ValueError(
+            f"patterns must have shape (n_classes, pattern_bins, n_inputs) = {expected} as the "
+            f"task says, got {patterns.shape}"
+        )
+    with np.errstate(divide="ignore"):
+        return World(
+            task.n_inputs,
+            task.pattern_bins,
+            task.background_bins,
+            task.n_classes,
+            task.jitter_bins,
+            task.deletion,
+            task.mean_occurrences,
+            float(-np.log1p(-task.rate)),
+            float(-np.log1p(-task.onset_probability)),
+            np.array(task.owed, np.int64),
+            patterns.channels,
+            patterns.offsets,
+        )
