@@ -36,7 +36,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     No fast-math: the same operations in the same order give the same bits everywhere, which the
     tests of "same bits" rely on. Division by zero follows IEEE (infinity or NaN), as in NumPy.
     """
-    dispatcher = njit(nogil=True, cache=True, error_model="numpy")(function)
+    dispatcher: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
     package = function.__module__.partition(".")[0]
     if package in ("gnm_env", "agents"):
         cache = dispatcher._cache

@@ -36,7 +36,8 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
         self.observation_space = spaces.Box(0, 1, (self.task.n_inputs,), np.int8)
         self.action_space: spaces.Space[Any] = spaces.Discrete(2)
         self.potential = float("nan")
-        """Membrane potential of the agent, for pictures only; an agent may set it before `step`."""
+        """The agent's membrane potential in units of its threshold, for pictures only: an agent may
+        set it before `step`."""
         self._running = False
         self._scroll: Any = None
         if render_mode is not None:
@@ -44,7 +45,7 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
 
             self._scroll = Scroll(self.task, self.patterns)
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The last bins as a picture, (height, width, 3) uint8; None without a render mode."""
         return None if self._scroll is None else self._scroll.frame()
 

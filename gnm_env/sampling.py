@@ -198,9 +198,7 @@ def append_trial(
         before = keys[k] // world.n_classes
         class_ = keys[k] - before * world.n_classes
         if before > noise_done:
-            channels, offsets = append_noise(
-                rng, world, before - noise_done, channels, offsets, t
-            )
+            channels, offsets = append_noise(rng, world, before - noise_done, channels, offsets, t)
             t += before - noise_done
             noise_done = before
         onsets[occurrence + k] = t - bin_
@@ -249,4 +247,5 @@ def new_buffers() -> tuple[
     NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
 ]:
     """Empty buffers for channels, offsets (offsets[0] = 0), onsets and classes."""
-    return np.empty(256, np.int32), np.zeros(512, np.int64), np.empty(8, np.int64), np.empty(8, np.int64)
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    return channels, offsets, np.empty(8, np.int64), np.empty(8, np.int64)

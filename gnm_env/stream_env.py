@@ -41,9 +41,9 @@ class PatternStreamEnv(PatternEnv):
     the stream of `numpy.random.default_rng(s)` and a later `reset()` one that continues it.
 
     ## Episode End
-    `terminated` at the mistake: a spike in noise, one spike too many in an occurrence, or too few by
-    its last bin. `info` then holds `mistake` ("noise", "too many" or "too few") and `class` (−1 in
-    noise). `gym.make` truncates after 10,000 bins (`max_episode_steps`).
+    `terminated` at the mistake: a spike in noise, one spike too many in an occurrence, or too few
+    by its last bin. `info` then holds `mistake` ("noise", "too many" or "too few") and `class`
+    (−1 in noise). `gym.make` truncates after 10,000 bins (`max_episode_steps`).
 
     ## Arguments
     - `task`: a `Task`; or its fields as keywords, `gym.make(id, n_classes=2)`.
@@ -90,9 +90,7 @@ class PatternStreamEnv(PatternEnv):
         self._bin = 0
         self._count = 0
 
-    def step(
-        self, action: Any
-    ) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
         if not self._running:
             self._require_running()
         # Plain ints, as most loops send them, skip the slower general check.

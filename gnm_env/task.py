@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from gnm_env.checks import real, whole
 
 MAX_MEAN_BINS = 100_000_000
-"""Longest mean trial that a Task accepts, in bins: beyond it a single draw would fill the memory."""
+"""Longest mean trial that a Task accepts, in bins: beyond it one draw would fill the memory."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class Task:
             distractor. None means (1, 2, …, C).
         background_bins: noise bins in a trial, into which the patterns are inserted.
         mean_occurrences: mean of the Poisson number of occurrences per class and trial.
-        onset_probability: q, probability that a pattern starts, per noise bin of the endless stream.
+        onset_probability: q, probability that a pattern starts, per noise bin of the endless
+            stream.
         jitter_bins: j; each spike of each occurrence is moved by an integer uniform on −j … j and
             held at the pattern's first or last bin where that would carry it outside.
         deletion: probability that a spike of an occurrence is dropped.
@@ -62,7 +63,8 @@ class Task:
         mean_bins = self.background_bins + self.mean_pattern_bins
         if mean_bins > MAX_MEAN_BINS:
             raise ValueError(
-                f"a trial must have at most {MAX_MEAN_BINS:,} bins on average, got {mean_bins:,.0f}: "
+                f"a trial must have at most {MAX_MEAN_BINS:,} bins on average, "
+                f"got {mean_bins:,.0f}; "
                 "lower background_bins, pattern_bins, n_classes or mean_occurrences"
             )
 
@@ -103,7 +105,7 @@ class Task:
 
     @staticmethod
     def from_keywords(task: Task | None, keywords: dict[str, Any]) -> Task:
-        """`task`, or the Task made of `keywords`; ValueError if both are given or a name is wrong."""
+        """`task`, or the Task of `keywords`; ValueError if both are given or a name is wrong."""
         names = [field.name for field in fields(Task)]
         unknown = sorted(set(keywords) - set(names))
         if unknown:
@@ -164,8 +166,7 @@ class Patterns:
 
     def dense(self) -> NDArray[np.bool_]:
         """The patterns as a new bool array of shape (C, M, N)."""
-        n_classes, pattern_bins, n_inputs = self.shape
-        return dense(self.channels, self.offsets, n_inputs).reshape(self.shape)
+        return dense(self.channels, self.offsets, self.shape[2]).reshape(self.shape)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Patterns):
@@ -181,7 +182,7 @@ class Patterns:
 
 
 def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Channels and offsets per bin of a binary raster (bins, channels); ValueError if not binary."""
+    """Channels and offsets per bin of a raster (bins, channels); ValueError if not binary."""
     raster = np.asarray(bits)
     if raster.dtype != np.bool_:
         if not np.issubdtype(raster.dtype, np.number) or not np.isin(raster, (0, 1)).all():

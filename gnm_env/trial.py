@@ -75,7 +75,8 @@ class Trial:
         bits = np.asarray(raster)
         if bits.ndim != 2 or bits.shape[1] != task.n_inputs or len(bits) == 0:
             raise ValueError(
-                f"a raster must have shape (bins >= 1, n_inputs = {task.n_inputs}), got {bits.shape}"
+                f"a raster must have shape (bins >= 1, n_inputs = {task.n_inputs}), "
+                f"got {bits.shape}"
             )
         channels, offsets = sparse(bits, "a raster")
         return cls._with_occurrences(channels, offsets, onsets, classes, task)

@@ -22,10 +22,10 @@ class PatternTrialEnv(PatternEnv):
 
     ## Description
     N input channels spike at random, each with probability p per time bin. Into this noise fixed
-    patterns of M bins are inserted, a Poisson number of each class per trial, at random times. Noise
-    and patterns have the same statistics. The agent answers each bin with a spike or silence. It
-    owes each occurrence of class c exactly `targets[c]` spikes, and noise none; but all that it is
-    told, by default, is at the end, and only about the sum: the *aggregate label*
+    patterns of M bins are inserted, a Poisson number of each class per trial, at random times.
+    Noise and patterns have the same statistics. The agent answers each bin with a spike or silence.
+    It owes each occurrence of class c exactly `targets[c]` spikes, and noise none; but all that it
+    is told, by default, is at the end, and only about the sum: the *aggregate label*
     Σ_c k_c·targets[c]. From Fil & Chu, "Minimal spiking neuron for solving multi-label
     classification tasks".
 
@@ -129,9 +129,7 @@ class PatternTrialEnv(PatternEnv):
         if self._scroll is not None:
             self._scroll.clear()
 
-    def step(
-        self, action: Any
-    ) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
         if not self._running:
             self._require_running()
         # Plain ints, as most loops send them, skip the slower general check.
@@ -191,5 +189,3 @@ class PatternTrialEnv(PatternEnv):
             "targets": trial.targets,
             "pattern_bins": trial.pattern_bins,
         }
-
-
