@@ -1,0 +1,160 @@
+"""Checkpoints: one file, no pickle, written whole or not at all.
+
+A checkpoint is a zip of plain arrays (NumPy's npz) with a JSON header beside them. Each kind of
+agent registers itself with `register_kind`, so that `load_checkpoint` opens any of them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from gnm_env.task import Patterns, Task
+
+FORMAT = 1
+_HEADER = "header"
+_KINDS: dict[str, type] = {}
+_Class = TypeVar("_Class", bound=type)
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What a checkpoint holds beside the agent: the task that it was trained on, and how far.
+
+    Attributes:
+        agent: the agent, ready to go on.
+        task: its task, if it was saved with one.
+        patterns: its patterns, likewise.
+        rng: the generator of its stream, as it stood when it was saved.
+    """
+
+    agent: Any
+    task: Task | None = None
+    patterns: Patterns | None = None
+    rng: Generator | None = None
+
+
+def register_kind(kind: str) -> Callable[[_Class], _Class]:
+    """Class decorator: checkpoints of this kind are loaded by the class's `from_checkpoint`."""
+
+    def register(cls: _Class) -> _Class:
+        _KINDS[kind] = cls
+        return cls
+
+    return register
+
+
+@contextlib.contextmanager
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
+    """A binary file that takes the place of `path` once it is complete; a failure leaves the old one.
+
+    Raises ValueError if the folder cannot be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise ValueError(
+            f"cannot write {target}: {error.strerror}; choose a folder that exists and is writable"
+        ) from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def write(
+    path: str | os.PathLike[str],
+    kind: str,
+    header: dict[str, Any],
+    arrays: dict[str, NDArray[Any]],
+    *,
+    task: Task | None = None,
+    patterns: Patterns | None = None,
+    rng: Generator | None = None,
+) -> None:
+    """Write a checkpoint; `header` must be JSON, infinities and all. Atomic."""
+    full_header = {"format": FORMAT, "kind": kind, **header}
+    contents = dict(arrays)
+    if task is not None:
+        full_header["task"] = asdict(task)
+    if patterns is not None:
+        contents["patterns"] = np.packbits(patterns.dense())
+        full_header["patterns_shape"] = patterns.shape
+    if rng is not None:
+        full_header["rng"] = rng.bit_generator.state
+    text = json.dumps(full_header, default=_plain).encode()
+    with atomic_write(path) as file:
+        np.savez(file, **{_HEADER: np.frombuffer(text, np.uint8)}, **contents)
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays, as JSON knows them."""
+    return value.tolist()
+
+
+def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, NDArray[Any]]]:
+    """Kind, header and arrays of a checkpoint; ValueError if it is none or is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        header = json.loads(arrays.pop(_HEADER).tobytes())
+        if header["format"] != FORMAT:
+            raise ValueError(f"format {header['format']}")
+        return header["kind"], header, arrays
+    except FileNotFoundError:
+        raise ValueError(f"there is no checkpoint {path}; give the path of a saved agent") from None
+    except Exception as error:
+        raise ValueError(
+            f"{path} is not a readable checkpoint ({type(error).__name__}: {error}); "
+            "it is damaged or of another kind: train and save again"
+        ) from None
+
+
+def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
+    """Load an agent of any kind with all that was saved beside it; ValueError if it is damaged."""
+    kind, header, arrays = read(path)
+    if kind not in _KINDS:
+        known = ", ".join(sorted(_KINDS))
+        raise ValueError(f"{path} holds an agent of kind {kind!r}; known kinds: {known}")
+    try:
+        task = Task(**header["task"]) if "task" in header else None
+        patterns = None
+        if "patterns_shape" in header:
+            shape = tuple(header["patterns_shape"])
+            bits = np.unpackbits(arrays.pop("patterns"), count=int(np.prod(shape)))
+            patterns = Patterns.from_dense(bits.reshape(shape))
+        agent = _KINDS[kind].from_checkpoint(header, arrays)  # type: ignore[attr-defined]
+        return Checkpoint(agent, task, patterns, _generator(header.get("rng")))
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise ValueError(f"{path} is not a valid {kind} checkpoint: {error}") from None
+
+
+def _generator(state: dict[str, Any] | None) -> Generator | None:
+    if state is None:
+        return None
+    bit_generator = getattr(np.random, state["bit_generator"])()
+    bit_generator.state = state
+    return Generator(bit_generator)

@@ -1,0 +1,116 @@
+"""How good a trained agent is: noisy performance, mistakes, answers per class, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.lane_group import Answers
+from agents.many import lane_groups
+from gnm_env.checks import whole
+from gnm_env.stream_env import MAX_EPISODE_BINS
+from gnm_env.task import Patterns, Task
+
+
+def noisy_performance(
+    agent: Any | Sequence[Any],
+    task: Task,
+    patterns: Patterns,
+    runs: int = 100,
+    cap: int = MAX_EPISODE_BINS,
+    seed: int = 0,
+    *,
+    threads: int | None = None,
+    shared: bool = True,
+) -> NDArray[np.int64]:
+    """Bins survived before the first mistake on endless streams, learning off.
+
+    Equal to the returns of `gnm/PatternStream-v0`, stepped with the agent: run k hears the stream
+    of `reset(seed=seed + k)`.
+
+    Args:
+        agent: an agent, or a list of agents.
+        task, patterns: what they hear.
+        runs: number of streams.
+        cap: most bins per stream.
+        seed: of the streams. Space the seeds of different measurements by at least `runs`.
+        threads: number of threads; None: one per core.
+        shared: whether the agents of a list hear the same streams. If not, agent b hears those of
+            seed + b·runs.
+
+    Returns:
+        int64 (runs,), or (agents, runs) for a list.
+    """
+    runs, cap = whole("runs", runs, low=1), whole("cap", cap, low=1)
+    seed = whole("seed", seed, low=0)
+    agents = list(agent) if isinstance(agent, Sequence) else [agent]
+    bins = np.empty((len(agents), runs), np.int64)
+    if shared:
+        units = lane_groups(agents, task, patterns, threads)
+    else:
+        units = [
+            (group, [b])
+            for b in range(len(agents))
+            for group, _ in lane_groups(agents[b : b + 1], task, patterns, 1)
+        ]
+
+    def fill(unit: int) -> None:
+        group, places = units[unit]
+        first = seed if shared else seed + places[0] * runs
+        for k in range(runs):
+            bins[places, k] = group.survive(np.random.default_rng(first + k), cap)
+
+    with ThreadPoolExecutor(threads or len(units)) as pool:
+        list(pool.map(fill, range(len(units))))
+    return bins if isinstance(agent, Sequence) else bins[0]
+
+
+def answers(
+    agent: Any | Sequence[Any], task: Task, patterns: Patterns, trials: int = 2_000, seed: int = 0
+) -> Answers:
+    """What an agent, or each agent of a list of one kind, answers to `trials` trials of `seed`."""
+    agents = list(agent) if isinstance(agent, Sequence) else [agent]
+    group = type(agents[0]).lanes(agents, task, patterns)
+    result: Answers = group.answer(np.random.default_rng(seed), whole("trials", trials, low=1))
+    return result
+
+
+@dataclass(frozen=True)
+class MistakeRate:
+    """Mistakes per 10,000 bins over all runs, with an exact 95 % Poisson interval."""
+
+    rate: float
+    low: float
+    high: float
+
+
+def mistake_rate(survived: ArrayLike, cap: int = MAX_EPISODE_BINS) -> MistakeRate:
+    """The mistake rate of runs that survived so many bins each; those at the cap made no mistake."""
+    from scipy.stats import chi2
+
+    bins = np.asarray(survived)
+    mistakes = int(np.sum(bins < cap))
+    # A neuron that errs in the very first bin of every run has survived none: count that bin.
+    exposure = max(int(bins.sum()), 1) / 10_000
+    low = chi2.ppf(0.025, 2 * mistakes) / 2 if mistakes else 0.0
+    high = chi2.ppf(0.975, 2 * mistakes + 2) / 2
+    return MistakeRate(mistakes / exposure, float(low) / exposure, float(high) / exposure)
+
+
+def bootstrap_interval(
+    values: ArrayLike, *, resamples: int = 10_000, seed: int = 0
+) -> tuple[float, float]:
+    """95 % percentile bootstrap interval of the mean of `values`, (n,)."""
+    sample = np.asarray(values, np.float64)
+    rng = np.random.default_rng(seed)
+    chunks = [
+        sample[rng.integers(0, len(sample), (n, len(sample)))].mean(axis=1)
+        for n in (resamples // 10,) * 10
+    ]
+    low, high = np.percentile(np.concatenate(chunks), (2.5, 97.5))
+    return float(low), float(high)

@@ -1,0 +1,306 @@
+"""Neurons side by side: a value type for compiled code that holds one number for each of W neurons.
+
+A formula that is written for plain numbers, such as ``V + I - leak * V``, works on these values
+unchanged and is then computed for all W neurons at once, in the processor's vector registers. So
+each formula stands once and serves one neuron (W = 1: plain float64 and bool) and many. Each lane
+sees the same IEEE operations in the same order as a plain number would: the same bits.
+
+Compiled code obtains values from arrays whose rows hold W numbers, one for each lane:
+
+    full(0.0, W)             the same number in every lane; W must be a constant of the code
+    like(0.0, x)             the same number in as many lanes as x has
+    load(block, row, x)      row `row` of `block`, shape (rows, W), in as many lanes as x has
+    store(block, row, x)     the reverse
+    unpack(Type, block, x)   a NamedTuple whose fields are the rows of `block`
+    pack(block, t)           the reverse
+    repeated(Type, x)        a NamedTuple whose fields are all x
+    where(mask, x, y)        x where the mask holds, y elsewhere; both are evaluated
+    any_lane(mask)           whether the mask holds anywhere
+    negated(mask)            where it does not hold
+    power(x, y)              x**y; one call of the C library per lane
+
+Comparisons give masks, to be joined by ``&`` and ``|``.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+_DOUBLE = ir.DoubleType()
+_BIT = ir.IntType(1)
+_INT32 = ir.IntType(32)
+
+
+class Lanes(types.Type):
+    """One float64 for each of `width` neurons."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+
+class Mask(types.Type):
+    """One truth value for each of `width` neurons."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Mask({width})")
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: Lanes) -> None:
+        super().__init__(manager, lanes, ir.VectorType(_DOUBLE, lanes.width))
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, mask: Mask) -> None:
+        super().__init__(manager, mask, ir.VectorType(_BIT, mask.width))
+
+
+def _width(type_: types.Type) -> int:
+    return type_.width if isinstance(type_, (Lanes, Mask)) else 1
+
+
+def _lanes(width: int) -> types.Type:
+    return Lanes(width) if width > 1 else types.float64
+
+
+def _vector(width: int) -> ir.Type:
+    return ir.VectorType(_DOUBLE, width) if width > 1 else _DOUBLE
+
+
+def _splat(builder: Any, number: Any, width: int) -> Any:
+    """LLVM's way to put one number into every lane."""
+    if width == 1:
+        return number
+    vector = ir.VectorType(number.type, width)
+    undefined = ir.Constant(vector, ir.Undefined)
+    one = builder.insert_element(undefined, number, ir.Constant(_INT32, 0))
+    zeros = ir.Constant(ir.VectorType(_INT32, width), [0] * width)
+    return builder.shuffle_vector(one, undefined, zeros)
+
+
+def _spread(context: Any, builder: Any, value: Any, type_: Any, width: int) -> Any:
+    if isinstance(type_, Lanes):
+        return value
+    return _splat(builder, context.cast(builder, value, type_, types.float64), width)
+
+
+_NUMBER = (types.Float, types.Integer)
+_PAIRS = [(Lanes, Lanes)] + [pair for n in _NUMBER for pair in ((Lanes, n), (n, Lanes))]
+
+
+def _binary(op: Any, result: Callable[[int], types.Type], emit: Callable[..., Any]) -> None:
+    """Teach numba the operator `op` between lanes, or between lanes and a plain number."""
+
+    @infer_global(op)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            lanes = [a for a in args if isinstance(a, Lanes)]
+            if len(args) == 2 and lanes and all(isinstance(a, (Lanes, *_NUMBER)) for a in args):
+                return signature(result(lanes[0].width), *args)
+            return None
+
+    def implement(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = sig.return_type.width
+        pair = zip(args, sig.args, strict=True)
+        return emit(builder, *(_spread(context, builder, v, t, width) for v, t in pair))
+
+    for left, right in _PAIRS:
+        lower_builtin(op, left, right)(implement)
+
+
+for _name, _emit in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    for _op in (getattr(operator, _name), getattr(operator, f"i{_name}")):
+        _binary(_op, Lanes, lambda b, x, y, _emit=_emit: getattr(b, _emit)(x, y))
+
+for _name, _symbol in (
+    ("ge", ">="),
+    ("gt", ">"),
+    ("le", "<="),
+    ("lt", "<"),
+    ("eq", "=="),
+    ("ne", "!="),
+):
+    _binary(
+        getattr(operator, _name),
+        Mask,
+        lambda b, x, y, _symbol=_symbol: b.fcmp_ordered(_symbol, x, y),
+    )
+
+
+def _logical(op: Any, emit: Callable[..., Any]) -> None:
+    @infer_global(op)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == 2 and all(isinstance(a, Mask) for a in args):
+                return signature(args[0], *args)
+            return None
+
+    lower_builtin(op, Mask, Mask)(lambda context, builder, sig, args: emit(builder, *args))
+
+
+_logical(operator.and_, lambda builder, x, y: builder.and_(x, y))
+_logical(operator.or_, lambda builder, x, y: builder.or_(x, y))
+
+
+@intrinsic
+def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
+    """`x` in the lanes where `mask` holds, `y` in the others."""
+    width = _width(mask)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        values = zip(args[1:], sig.args[1:], strict=True)
+        return builder.select(args[0], *(_spread(context, builder, v, t, width) for v, t in values))
+
+    return _lanes(width)(mask, x, y), generate
+
+
+@intrinsic
+def any_lane(typing_context: Any, mask: Any) -> Any:
+    """Whether `mask` holds in any lane."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if not isinstance(mask, Mask):
+            return args[0]
+        bits = ir.IntType(mask.width)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0))
+
+    return types.boolean(mask), generate
+
+
+@intrinsic
+def negated(typing_context: Any, mask: Any) -> Any:
+    """Where `mask` does not hold (``~`` of a plain bool is a number, hence this function)."""
+    return mask(mask), lambda context, builder, sig, args: builder.not_(args[0])
+
+
+def _row_address(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
+    structure = context.make_array(array_type)(context, builder, array)
+    stride = cgutils.unpack_tuple(builder, structure.strides)[0]
+    base = builder.ptrtoint(structure.data, ir.IntType(64))
+    return builder.add(base, builder.mul(stride, row))
+
+
+def _load_row(context: Any, builder: Any, array_type: Any, array: Any, row: Any, width: int) -> Any:
+    address = _row_address(context, builder, array_type, array, row)
+    value = builder.load(builder.inttoptr(address, _vector(width).as_pointer()))
+    value.align = 8  # rows are aligned as their numbers are, not as whole vectors
+    return value
+
+
+def _store_row(context: Any, builder: Any, array: Any, value: Any, row: Any, x: Any) -> None:
+    address = _row_address(context, builder, array, value, row)
+    builder.store(x, builder.inttoptr(address, x.type.as_pointer())).align = 8
+
+
+@intrinsic
+def load(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
+    """Row `row` of the float64 array `block` of shape (rows, W), W the lanes of `x`."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _load_row(context, builder, sig.args[0], args[0], args[1], _width(x))
+
+    return _lanes(_width(x))(block, types.intp, x), generate
+
+
+@intrinsic
+def store(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
+    """Write the lanes of `x` into row `row` of `block`."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        _store_row(context, builder, sig.args[0], args[0], args[1], args[2])
+        return context.get_dummy_value()
+
+    return types.void(block, types.intp, x), generate
+
+
+@intrinsic(prefer_literal=True)
+def full(typing_context: Any, number: Any, width: Any) -> Any:
+    """`number` in every lane."""
+    lanes = width.literal_value
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _splat(builder, args[0], lanes)
+
+    # The literal itself is part of the signature: widths must not share one implementation.
+    return _lanes(lanes)(types.float64, width), generate
+
+
+@intrinsic
+def like(typing_context: Any, number: Any, x: Any) -> Any:
+    """`number` in as many lanes as `x` has."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _splat(builder, args[0], _width(x))
+
+    return _lanes(_width(x))(types.float64, x), generate
+
+
+def _named_tuple(type_: Any, x: Any) -> Any:
+    cls = type_.instance_class
+    return types.BaseTuple.from_types([_lanes(_width(x))] * len(cls._fields), cls)
+
+
+@intrinsic
+def unpack(typing_context: Any, type_: Any, block: Any, x: Any) -> Any:
+    """A `type_` (a NamedTuple class) whose fields are the rows of `block`, in order."""
+    result = _named_tuple(type_, x)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        rows = [context.get_constant(types.intp, k) for k in range(len(result))]
+        fields = [_load_row(context, builder, sig.args[1], args[1], row, _width(x)) for row in rows]
+        return context.make_tuple(builder, result, fields)
+
+    return result(type_, block, x), generate
+
+
+@intrinsic
+def pack(typing_context: Any, block: Any, x: Any) -> Any:
+    """Write the fields of the NamedTuple `x` into the rows of `block`, in order."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        for k, field in enumerate(cgutils.unpack_tuple(builder, args[1])):
+            row = context.get_constant(types.intp, k)
+            _store_row(context, builder, sig.args[0], args[0], row, field)
+        return context.get_dummy_value()
+
+    return types.void(block, x), generate
+
+
+@intrinsic
+def repeated(typing_context: Any, type_: Any, x: Any) -> Any:
+    """A `type_` (a NamedTuple class) whose fields are all `x`."""
+    result = _named_tuple(type_, x)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.make_tuple(builder, result, [args[1]] * len(result))
+
+    return result(type_, x), generate
+
+
+@intrinsic
+def power(typing_context: Any, x: Any, y: Any) -> Any:
+    """x**y, lane by lane: the C library's `pow`, whatever the number of lanes."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pow_ = builder.module.declare_intrinsic("llvm.pow", [_DOUBLE])
+        if not isinstance(x, Lanes):
+            return builder.call(pow_, args)
+        result = ir.Constant(ir.VectorType(_DOUBLE, x.width), ir.Undefined)
+        for k in range(x.width):
+            lane = ir.Constant(_INT32, k)
+            number = builder.call(pow_, [builder.extract_element(a, lane) for a in args])
+            result = builder.insert_element(result, number, lane)
+        return result
+
+    return x(x, y), generate

@@ -1,0 +1,80 @@
+"""The standard loop: one agent, one environment, one bin at a time."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.random import Generator
+
+from agents.history import BLOCK, Callback, History
+from gnm_env.checks import whole
+
+
+class WeightOverflow(RuntimeWarning):
+    """A weight would have overflowed: learning ended, the last finite weights are kept."""
+
+
+def train(
+    agent: Any,
+    env: gym.Env[Any, Any],
+    trials: int,
+    seed: int | Generator | None = None,
+    *,
+    callback: Callback | None = None,
+    block: int = BLOCK,
+) -> History:
+    """Train `agent` on `trials` episodes of `env`, a PatternTrial environment, wrapped or not.
+
+    Args:
+        agent: offers begin_trial(), act(obs) and learn(reward, info, sign_only).
+        env: gives the aggregate label in its terminal info, or its sign as reward.
+        trials: number of episodes.
+        seed: of the stream. A Generator goes on from where it stands (and is moved on); None goes
+            on with the environment's own.
+        callback: called after each block with the trials done and the history; False ends training.
+        block: trials per entry of the history.
+
+    Returns:
+        The learning curve. Ends with the same bits as `train_many` on the same seed.
+    """
+    trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
+    sign_only = getattr(env.unwrapped, "feedback", None) == "sign"
+    if isinstance(seed, Generator):
+        env.unwrapped.np_random = seed
+        seed = None
+    history = History()
+    for start in range(0, trials, block):
+        size = min(block, trials - start)
+        wrong, absolute = 0, 0.0
+        for _ in range(size):
+            obs, info = env.reset(seed=seed)
+            seed = None
+            agent.begin_trial()
+            ended = False
+            while not ended:
+                obs, reward, terminated, truncated, info = env.step(agent.act(obs))
+                ended = terminated or truncated
+            agent.learn(float(reward), info, sign_only)
+            error = abs(info["label"] - info["emitted"])
+            wrong += error > getattr(env.unwrapped, "tolerance", 0.0)
+            absolute += error
+        history.append(size, wrong, absolute)
+        if agent.overflowed:
+            history.overflowed = np.array(start + size - 1)
+            warn_of_overflow("the agent", start + size)
+            break
+        if callback is not None and callback(start + size, history) is False:
+            break
+    return history
+
+
+def warn_of_overflow(who: str, trials: int) -> None:
+    warnings.warn(
+        f"a weight of {who} would have overflowed within {trials:,} trials: learning ended and the "
+        "last finite weights are kept; lower learning_rate or set weight_bounds",
+        WeightOverflow,
+        stacklevel=3,
+    )

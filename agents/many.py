@@ -1,0 +1,147 @@
+"""Many agents on one shared stream, compiled, on all cores: the same arithmetic as the loop."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from agents.history import BLOCK, Callback, History
+from agents.lane_group import LaneGroup
+from agents.loop import warn_of_overflow
+from gnm_env.checks import whole
+from gnm_env.task import Patterns, Task
+
+LANES_PER_UNIT = 32
+"""Agents are handed to threads in multiples of this many, the width of the widest block."""
+
+
+def train_many(
+    agents: Sequence[Any],
+    task: Task,
+    patterns: Patterns,
+    trials: int,
+    seed: int | Generator | None = None,
+    threads: int | None = None,
+    *,
+    callback: Callback | None = None,
+    block: int = BLOCK,
+) -> History:
+    """Train agents on the same `trials` trials, each drawn once for all of them.
+
+    Each agent ends with the bits that `train` gives it alone on the same seed, whatever the number
+    of agents and of threads.
+
+    Args:
+        agents: of any kinds; those alike are trained side by side.
+        task, patterns: what they hear.
+        trials: number of trials.
+        seed: of the stream. A Generator goes on from where it stands, and is moved on.
+        threads: number of threads; None: one per core.
+        callback: called after each block with the trials done and the history; False ends training.
+            The agents are up to date when it is called.
+        block: trials per entry of the history.
+
+    Returns:
+        The learning curves, with one column per agent, in the order of `agents`.
+
+    Raises:
+        ValueError: if there are no agents, if they do not fit the task, or if memory is short.
+    """
+    trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
+    rng = seed if isinstance(seed, Generator) else np.random.default_rng(seed)
+    units = lane_groups(agents, task, patterns, threads)
+    history = History(
+        error_rate=np.empty((0, len(agents))),
+        mean_error=np.empty((0, len(agents))),
+        overflowed=np.full(len(agents), -1),
+    )
+    with ThreadPoolExecutor(max(len(units), 1)) as pool:
+        try:
+            for start in range(0, trials, block):
+                size = min(block, trials - start)
+                _train_block(units, pool, rng, size, history)
+                if callback is not None:
+                    _write_back(units)
+                    if callback(start + size, history) is False:
+                        break
+                if np.all(history.overflowed >= 0):
+                    break
+        finally:
+            _write_back(units)
+    for k in np.flatnonzero(history.overflowed >= 0):
+        warn_of_overflow(f"agent {k}", int(history.overflowed[k]) + 1)
+    return history
+
+
+Unit = tuple[LaneGroup, list[int]]
+"""Agents that one thread trains side by side, and their places in the user's list."""
+
+
+def _train_block(
+    units: list[Unit], pool: ThreadPoolExecutor, rng: Generator, size: int, history: History
+) -> None:
+    """One block of trials for all units, each with its own copy of the stream's generator."""
+    # The first unit moves the caller's generator on; the others hear the same from copies.
+    streams = [rng] + [copy.deepcopy(rng) for _ in units[1:]]
+    wrong = np.empty(len(history.overflowed))
+    absolute = np.empty(len(history.overflowed))
+    tasks = [
+        pool.submit(group.train, stream, size)
+        for (group, _), stream in zip(units, streams, strict=True)
+    ]
+    for (group, places), result in zip(units, tasks, strict=True):
+        wrong[places], absolute[places] = result.result()
+        history.overflowed[places] = group.overflowed()
+    history.append(size, wrong, absolute)
+
+
+def _write_back(units: list[Unit]) -> None:
+    for group, _ in units:
+        group.write_back()
+
+
+def lane_groups(
+    agents: Sequence[Any], task: Task, patterns: Patterns, threads: int | None
+) -> list[Unit]:
+    """Agents grouped by kind and cut into units for the threads, each with its agents' places."""
+    if not isinstance(agents, Sequence) or len(agents) == 0:
+        raise ValueError(f"agents must be a list of at least one agent, got {agents!r}")
+    if threads is None:
+        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    threads = whole("threads", threads, low=1)
+    _require_memory(agents, task)
+    kinds: dict[Hashable, list[int]] = defaultdict(list)
+    for place, agent in enumerate(agents):
+        kinds[agent.group_key()].append(place)
+    units: list[Unit] = []
+    for places in kinds.values():
+        for part in _parts(places, threads):
+            members = [agents[place] for place in part]
+            units.append((type(members[0]).lanes(members, task, patterns), part))
+    return units
+
+
+def _parts(places: list[int], threads: int) -> list[list[int]]:
+    """At most `threads` runs of nearly equal length, whole blocks of lanes each."""
+    blocks = -(-len(places) // LANES_PER_UNIT)
+    cuts = np.linspace(0, blocks, min(threads, blocks) + 1).round().astype(int) * LANES_PER_UNIT
+    return [places[a:b] for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+
+
+def _require_memory(agents: Sequence[Any], task: Task) -> None:
+    """ValueError if the agents' weights and their changes do not fit into this machine's memory."""
+    needed = 2 * 8 * task.n_inputs * (-(-len(agents) // LANES_PER_UNIT) * LANES_PER_UNIT)
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there:
+        raise ValueError(
+            f"training {len(agents):,} agents of {task.n_inputs:,} inputs side by side needs "
+            f"{needed / 2**30:,.1f} GiB, this machine has {there / 2**30:,.1f}: "
+            "train fewer agents at a time"
+        )

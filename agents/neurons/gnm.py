@@ -1,0 +1,165 @@
+"""The generalised neuron model (GNM) of Fil & Chu, equation 1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from agents.lanes import any_lane, like, negated, power, where
+from agents.neurons.neuron import Neuron, Response, Trace
+from gnm_env.checks import choice, real
+from gnm_env.compiled import compiled
+
+# How R is computed: not at all, or by a Hill function whose exponent is whole, infinite or real.
+_NO_RECOVERY, _WHOLE, _STEP, _REAL = range(4)
+_LARGEST_WHOLE = 4096
+"""Largest exponent that is raised by repeated squaring; above it `pow` is as good."""
+
+
+class Parameters(NamedTuple):
+    leak: Any
+    """(1−η)α"""
+    eta_gamma: Any
+    """ηγ"""
+    beta: Any
+    zeta: Any
+    theta_b: Any
+    theta_r: Any
+    h: Any
+    flat_below: Any
+    """V/ϑ_B below which the Hill function is 0 to within 2⁻⁶⁰ …"""
+    flat_above: Any
+    """… and above which it is 1 to within rounding."""
+
+
+class State(NamedTuple):
+    V: Any
+    R: Any
+    X: Any
+
+
+@compiled
+def whole_power(x: Any, exponent: int) -> Any:
+    """x**exponent by repeated squaring."""
+    result = like(1.0, x)
+    while exponent > 0:
+        if exponent & 1:
+            result = result * x
+        x = x * x
+        exponent >>= 1
+    return result
+
+
+@compiled
+def hill(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
+    """H(V) = V^h / (ϑ_B^h + V^h), 0 for V <= 0; a step with ½ at V = ϑ_B for infinite h.
+
+    Far from ϑ_B the function is flat to within rounding, and the power is not computed.
+    """
+    if mode[1] == _STEP:
+        return where(p.theta_b < V, 1.0, where(p.theta_b == V, 0.5, like(0.0, V)))
+    u = V / p.theta_b
+    H = where(u > 1.0, 1.0, like(0.0, V))
+    steep = (u > p.flat_below) & (u < p.flat_above)
+    if any_lane(steep):
+        u_h = whole_power(u, mode[2]) if mode[1] == _WHOLE else power(u, p.h)
+        H = where(steep, u_h / (1.0 + u_h), H)
+    return H
+
+
+@compiled
+def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tuple[State, Response]:
+    """One bin. With everything on the right taken at t−1 but the input I(t):
+
+    D(t) = ηγ R V + (1−η)α V,  V(t) = V + I(t) − D(t),  R(t) = R + ζ H(V) − β R;
+    an output spike where the readout X (V, or D) rises to ϑ_R or above it.
+    """
+    R = state.R
+    D = p.leak * state.V
+    if mode[1] != _NO_RECOVERY:
+        D = p.eta_gamma * state.R * state.V + D
+        R = state.R + p.zeta * hill(p, mode, state.V) - p.beta * state.R
+    V = state.V + drive - D
+    X = V if mode[0] == 0 else D
+    above = p.theta_r <= X
+    spike = above & negated(p.theta_r <= state.X)
+    return State(V, R, X), Response(V, D, R, X, above, spike)
+
+
+@dataclass(frozen=True)
+class GNM(Neuron):
+    """Generalised neuron model: a leaky integrator with an optional soft reset.
+
+    Raises ValueError if a parameter is out of range.
+
+    Attributes:
+        alpha: α, decay of the membrane potential per bin, 0 (never forgets) … 1 (no memory).
+        eta: η, model choice, 0 (no spikiness: R has no effect) … 1 (decay by R alone).
+        beta: β, decay of R per bin, 0 … 1.
+        gamma: γ, strength of the decay by R.
+        zeta: ζ, rate at which R grows above the behavioural threshold.
+        theta_b: ϑ_B, behavioural threshold of the Hill function, in membrane-potential units.
+        theta_r: ϑ_R, readout threshold, in units of the readout.
+        h: exponent of the Hill function, >= 1; infinity makes it a step.
+        readout: what is compared with ϑ_R, "V" or "D". With "D" leave the weights unbounded: D = αV
+            must be able to reach ϑ_R.
+    """
+
+    alpha: float = 0.3
+    eta: float = 0.0
+    beta: float = 0.3
+    gamma: float = 1.0
+    zeta: float = 1.0
+    theta_b: float = 1.0
+    theta_r: float = 1.0
+    h: float = 200.0
+    readout: str = "V"
+
+    name: ClassVar[str] = "gnm"
+    default_initial_weight: ClassVar[float] = 0.1
+    parameters_type: ClassVar[type] = Parameters
+    state_type: ClassVar[type] = State
+    step: ClassVar[Any] = step
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "eta", "beta"):
+            real(name, getattr(self, name), low=0.0, high=1.0)
+        for name in ("gamma", "zeta"):
+            real(name, getattr(self, name), low=0.0)
+        for name in ("theta_b", "theta_r"):
+            real(name, getattr(self, name), above=0.0)
+        real("h", self.h, low=1.0, finite=False)
+        choice("readout", self.readout, ("V", "D"))
+
+    @property
+    def threshold(self) -> float:
+        return self.theta_r
+
+    def parameters(self) -> tuple[float, ...]:
+        return (
+            (1.0 - self.eta) * self.alpha,
+            self.eta * self.gamma,
+            self.beta,
+            self.zeta,
+            self.theta_b,
+            self.theta_r,
+            self.h,
+            2.0 ** (-60.0 / self.h),
+            2.0 ** (54.0 / self.h),
+        )
+
+    def mode(self) -> tuple[int, ...]:
+        return self._mode(_NO_RECOVERY) if self.eta == 0.0 else self.recording_mode()
+
+    def recording_mode(self) -> tuple[int, ...]:
+        if math.isinf(self.h):
+            return self._mode(_STEP)
+        whole = self.h <= _LARGEST_WHOLE and self.h == int(self.h)
+        return self._mode(_WHOLE if whole else _REAL)
+
+    def _mode(self, recovery: int) -> tuple[int, ...]:
+        return (int(self.readout == "D"), recovery, int(self.h) if recovery == _WHOLE else 0)
+
+    def trace(self) -> Trace:
+        return Trace(1.0 - (1.0 - self.eta) * self.alpha)

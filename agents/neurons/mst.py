@@ -1,0 +1,98 @@
+"""Gütig's multi-spike tempotron (MST), with its bi-exponential synapses and soft reset."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from agents.lanes import negated, where
+from agents.neurons.neuron import Neuron, Response, Trace
+from gnm_env.checks import real
+from gnm_env.compiled import compiled
+
+
+class Parameters(NamedTuple):
+    slow: Any
+    """e^(−1/τ_m)"""
+    fast: Any
+    """e^(−1/τ_s)"""
+    scale: Any
+    """V_norm: makes the largest response to a single unit spike 1."""
+    theta: Any
+
+
+class State(NamedTuple):
+    slow: Any
+    """Σ w e^(−(t−t_j)/τ_m) over the input spikes so far."""
+    fast: Any
+    """Σ w e^(−(t−t_j)/τ_s), likewise."""
+    reset: Any
+    """Σ e^(−(t−t_s)/τ_m) over earlier output spikes, as it stands in the coming bin."""
+    V: Any
+
+
+@compiled
+def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tuple[State, Response]:
+    """One bin: V(t) = V_norm Σ_j w [e^(−(t−t_j)/τ_m) − e^(−(t−t_j)/τ_s)] − ϑ Σ_s e^(−(t−t_s)/τ_m).
+
+    Three decaying sums carry the whole history of input spikes t_j and output spikes t_s.
+    """
+    slow = p.slow * state.slow + drive
+    fast = p.fast * state.fast + drive
+    D = p.theta * state.reset
+    V = p.scale * (slow - fast) - D
+    above = p.theta <= V
+    spike = above & negated(p.theta <= state.V)
+    reset = p.slow * (state.reset + where(spike, 1.0, 0.0))
+    return State(slow, fast, reset, V), Response(V, D, state.reset, V, above, spike)
+
+
+@dataclass(frozen=True)
+class MST(Neuron):
+    """Multi-spike tempotron. Raises ValueError unless 0 < tau_s < tau_m and theta > 0.
+
+    Attributes:
+        tau_m: τ_m, membrane time constant in bins.
+        tau_s: τ_s, synaptic time constant in bins.
+        theta: ϑ, threshold, in membrane-potential units.
+    """
+
+    tau_m: float = 20.0
+    tau_s: float = 5.0
+    theta: float = 1.0
+
+    name: ClassVar[str] = "mst"
+    default_initial_weight: ClassVar[float] = 0.02
+    parameters_type: ClassVar[type] = Parameters
+    state_type: ClassVar[type] = State
+    step: ClassVar[Any] = step
+
+    def __post_init__(self) -> None:
+        real("tau_m", self.tau_m, above=0.0)
+        real("tau_s", self.tau_s, above=0.0)
+        real("theta", self.theta, above=0.0)
+        if not self.tau_s < self.tau_m:
+            raise ValueError(
+                f"tau_s must be smaller than tau_m = {self.tau_m:g}, got {self.tau_s:g}: "
+                "the response to a spike rises with tau_s and falls with tau_m"
+            )
+
+    @property
+    def threshold(self) -> float:
+        return self.theta
+
+    @property
+    def v_norm(self) -> float:
+        """V_norm = k^(k/(k−1)) / (k−1) with k = τ_m/τ_s."""
+        k = self.tau_m / self.tau_s
+        return float(k ** (k / (k - 1.0)) / (k - 1.0))
+
+    def parameters(self) -> tuple[float, ...]:
+        trace = self.trace()
+        return (trace.slow, trace.fast, trace.scale, self.theta)
+
+    def trace(self) -> Trace:
+        return Trace(
+            math.exp(-1.0 / self.tau_m), math.exp(-1.0 / self.tau_s), self.v_norm, double=True
+        )
