@@ -1,0 +1,94 @@
+"""How far a long run is: a bar on a terminal, elsewhere a line a minute."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TextIO
+
+from tqdm import tqdm
+
+
+class Progress:
+    """Counts finished blocks. Use as a context manager.
+
+    Args:
+        name: what is being done.
+        total: blocks in all.
+        done: blocks that were there already; they do not count for the rate.
+        stream: where to write, standard error by default.
+        interval: seconds between lines where there is no terminal.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        total: int,
+        done: int = 0,
+        *,
+        stream: TextIO | None = None,
+        interval: float = 60.0,
+    ) -> None:
+        self.name, self.total, self.done, self.interval = name, total, done, interval
+        self._stream = stream or sys.stderr
+        self._new = 0
+        self._began = self._spoke = time.monotonic()
+        self._bar = None
+        if self._stream.isatty():
+            self._bar = tqdm(
+                total=total, initial=done, desc=name, unit="block", file=self._stream, leave=True
+            )
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+        elif kind is None:
+            self._say(f"{self.name}: {self.done}/{self.total} blocks, {self.seconds:.0f} s")
+
+    @property
+    def seconds(self) -> float:
+        """Time since the beginning."""
+        return time.monotonic() - self._began
+
+    def advance(self) -> None:
+        """One more block is finished."""
+        self.done += 1
+        self._new += 1
+        if self._bar is not None:
+            self._bar.update()
+        self.tick()
+
+    def tick(self) -> None:
+        """To be called now and then: writes the line when it is due."""
+        now = time.monotonic()
+        if self._bar is None and now - self._spoke >= self.interval:
+            self._spoke = now
+            self._say(self.line())
+
+    def line(self) -> str:
+        """Blocks done, rate and time left."""
+        rate = self._new / max(self.seconds, 1e-9)
+        left = f"{duration((self.total - self.done) / rate)} left" if rate else "no rate yet"
+        return f"{self.name}: {self.done}/{self.total} blocks, {60 * rate:.1f} blocks/min, {left}"
+
+    def _say(self, text: str) -> None:
+        print(text, file=self._stream, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as a person says them: "8 s", "4 min 10 s", "2 h 5 min"."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,96 @@
+"""Where blocks are computed: threads of this process, or a running Dask cluster.
+
+Both are executors of `concurrent.futures`, so that the sweep need not know which it has.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import experiments
+from experiments.design import Block
+
+CONNECTION_SECONDS = 5
+"""How long a scheduler may take to answer."""
+
+
+class Outcome(NamedTuple):
+    """A finished block: its arrays, how long it took, and the machine that computed it."""
+
+    values: Mapping[str, Any]
+    seconds: float
+    host: str
+
+
+def timed(compute: Callable[[Block], Mapping[str, Any]], block: Block) -> Outcome:
+    """Compute a block. Runs in the worker."""
+    start = time.monotonic()
+    values = compute(block)
+    return Outcome(values, time.monotonic() - start, socket.gethostname())
+
+
+@contextmanager
+def threads(count: int | None = None) -> Iterator[Executor]:
+    """`count` threads, one per core by default. The compiled loops do not hold the GIL."""
+    executor = ThreadPoolExecutor(count or os.cpu_count() or 1, thread_name_prefix="block")
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The Dask cluster whose scheduler listens at `address`, such as "tcp://node1:8786".
+
+    Its workers need the packages `gnm_env` and `agents`; what a block is travels with it. A worker
+    that dies costs the block it was at: the scheduler gives that block to another worker.
+
+    Raises ValueError if Dask is not installed, or if no scheduler answers.
+    """
+    try:
+        import cloudpickle
+        import distributed
+    except ImportError:
+        raise ValueError(
+            "--scheduler needs Dask, which is not installed: pip install 'gnm-env[cluster]'"
+        ) from None
+    _knock(address)
+    cloudpickle.register_pickle_by_value(experiments)
+    try:
+        with (
+            distributed.Client(address, set_as_default=False) as client,
+            client.get_executor(pure=False) as executor,
+        ):
+            yield executor
+    finally:
+        cloudpickle.unregister_pickle_by_value(experiments)
+
+
+def _knock(address: str) -> None:
+    """Raise ValueError unless a Dask scheduler answers at `address`.
+
+    A connection of its own: a Client that fails to connect complains once more when it is collected.
+    """
+    from distributed.comm import connect
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=CONNECTION_SECONDS)
+        await comm.close()
+
+    try:
+        asyncio.run(knock())
+    except Exception as error:  # anything at all, if it is something else that answers there
+        known = isinstance(error, (OSError, ValueError))
+        raise ValueError(
+            f"no Dask scheduler answers at {address} "
+            f"({error if known else 'what listens there is none'}): "
+            "start one with `dask scheduler`, or leave --scheduler out"
+        ) from None
