@@ -38,7 +38,6 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
         self.potential = float("nan")
         """The agent's membrane potential in units of its threshold, for pictures only: an agent may
         set it before `step`."""
-        self._running = False
         self._scroll: Any = None
         if render_mode is not None:
             from gnm_env.rendering import Scroll
@@ -49,17 +48,19 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
         """The last bins as a picture, (height, width, 3) uint8; None without a render mode."""
         return None if self._scroll is None else self._scroll.frame()
 
-    def _require_running(self) -> None:
-        if not self._running:
-            raise ResetNeeded("call reset() before step(): no trial is under way, or it has ended")
+    @staticmethod
+    def _require_reset() -> None:
+        raise ResetNeeded("call reset() before step(): no episode is under way, or it has ended")
 
     @staticmethod
     def _refuse_options(options: dict[str, Any] | None, known: tuple[str, ...]) -> dict[str, Any]:
-        unknown = sorted(set(options or {}) - set(known))
+        if not options:
+            return {}
+        unknown = sorted(set(options) - set(known))
         if unknown:
             allowed = ", ".join(map(repr, known)) or "none"
             raise ValueError(f"unknown reset option {unknown[0]!r}; known options: {allowed}")
-        return options or {}
+        return options
 
 
 def spike_from(action: Any) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gnm_env.pattern_env import PatternEnv, spike_from
-from gnm_env.sampling import append_piece
+from gnm_env.sampling import append_piece, new_buffers
 from gnm_env.task import Patterns, Task, dense
 
 MAX_EPISODE_BINS = 10_000
@@ -36,9 +36,9 @@ class PatternStreamEnv(PatternEnv):
     1.0 for each bin survived; 0.0 for the bin of the mistake.
 
     ## Starting State
-    Bin 0 of a fresh stream. The stream is drawn from the environment's generator in pieces of noise
-    with a pattern at their end; `reset` goes on to the next piece, so that `reset(seed=s)` hears
-    the stream of `numpy.random.default_rng(s)` and a later `reset()` one that continues it.
+    `reset(seed=s)` begins at bin 0 of the stream of `numpy.random.default_rng(s)`. A later
+    `reset()` goes on in that stream, right after the bin shown last or, where that lies in a
+    pattern, after the pattern. That is a fresh stream too, since every noise bin is like the first.
 
     ## Episode End
     `terminated` at the mistake: a spike in noise, one spike too many in an occurrence, or too few
@@ -64,57 +64,76 @@ class PatternStreamEnv(PatternEnv):
         **task_fields: Any,
     ) -> None:
         super().__init__(task, patterns, pattern_seed, render_mode, task_fields)
-        self._noise_left = -1.0
+        self._source: np.random.Generator | None = None
+        self._running = False
+        self._buffers = new_buffers()[:2]
+        self._ahead: list[NDArray[np.int8]] = []
+        """The bins of the present piece that are not yet shown, the next one last."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.int8], dict[str, Any]]:
         super().reset(seed=seed)
         self._refuse_options(options, ())
-        if seed is not None:
-            self._noise_left = -1.0
-        self._next_piece()
+        if self._source is not self.np_random:
+            self._begin_stream()
+        elif not (self._ahead and self._in_noise()):
+            self._next_piece()
+        self._count = 0
         self._running = True
         if self._scroll is not None:
             self._scroll.clear()
-        return self._rows[0], {}
+        return self._ahead.pop(), {}
+
+    def _begin_stream(self) -> None:
+        """A new generator, which `reset(seed=…)` makes, is a new stream."""
+        self._source = self.np_random
+        self._noise_left = -1.0
+        self._next_piece()
 
     def _next_piece(self) -> None:
-        channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
-        channels, offsets, self._n_noise, self._class, self._noise_left = append_piece(
-            self.np_random, self._world, self._noise_left, channels, offsets, 0
+        channels, offsets, n_noise, self._class, self._noise_left = append_piece(
+            self.np_random, self._world, self._noise_left, *self._buffers, 0
         )
-        self._n_bins = self._n_noise + (self.task.pattern_bins if self._class >= 0 else 0)
-        bins = offsets[: self._n_bins + 1]
-        self._rows = list(dense(channels[: bins[-1]], bins, self.task.n_inputs).view(np.int8))
-        self._bin = 0
+        self._buffers = channels, offsets
+        self._pattern_bins = self.task.pattern_bins if self._class >= 0 else 0
+        n_bins = n_noise + self._pattern_bins
+        self._raster = dense(channels, offsets[: n_bins + 1], self.task.n_inputs)
+        self._ahead = list(self._raster[::-1])
         self._count = 0
+
+    def _in_noise(self) -> bool:
+        """Whether the bin shown last is noise."""
+        return len(self._ahead) >= self._pattern_bins
 
     def step(self, action: Any) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
         if not self._running:
-            self._require_running()
+            self._require_reset()
         # Plain ints, as most loops send them, skip the slower general check.
-        if type(action) is not int or action not in (0, 1):
+        if type(action) is not int or not 0 <= action <= 1:
             action = spike_from(action)
-        t = self._bin
-        class_ = -1 if t < self._n_noise else self._class
+        in_noise = len(self._ahead) >= self._pattern_bins
         if self._scroll is not None:
-            self._scroll.push(self._rows[t], class_, action, self.potential)
-        self._bin = t + 1
-        mistake = self._mistake(class_, action) if action or class_ >= 0 else ""
-        if self._bin == self._n_bins:
+            self._show(action)
+        mistake = ("noise" if action else "") if in_noise else self._mistake(action)
+        if mistake:
+            info = {"mistake": mistake, "class": -1 if in_noise else self._class}
+            self._running = False
+        if not self._ahead:
             self._next_piece()
         if mistake:
-            self._running = False
-            return self._rows[self._bin], 0.0, True, False, {"mistake": mistake, "class": class_}
-        return self._rows[self._bin], 1.0, False, False, {}
+            return self._ahead.pop(), 0.0, True, False, info
+        return self._ahead.pop(), 1.0, False, False, {}
 
-    def _mistake(self, class_: int, spike: int) -> str:
-        """What is wrong with the answer to the bin just heard; empty if nothing is."""
-        if class_ < 0:
-            return "noise" if spike else ""
+    def _mistake(self, spike: int) -> str:
+        """What is wrong with the answer to a bin of an occurrence; empty if nothing is."""
         self._count += spike
-        owed = self.task.owed[class_]
+        owed = self.task.owed[self._class]
         if self._count > owed:
             return "too many"
-        return "too few" if self._bin == self._n_bins and self._count < owed else ""
+        return "too few" if not self._ahead and self._count < owed else ""
+
+    def _show(self, spike: int) -> None:
+        """Show the picture the bin shown last and the answer to it."""
+        shown = self._raster[-1 - len(self._ahead)]
+        self._scroll.push(shown, -1 if self._in_noise() else self._class, spike, self.potential)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gnm_env.checks import real, whole
+from gnm_env.compiled import compiled
 
 MAX_MEAN_BINS = 100_000_000
 """Longest mean trial that a Task accepts, in bins: beyond it one draw would fill the memory."""
@@ -166,7 +167,7 @@ class Patterns:
 
     def dense(self) -> NDArray[np.bool_]:
         """The patterns as a new bool array of shape (C, M, N)."""
-        return dense(self.channels, self.offsets, self.shape[2]).reshape(self.shape)
+        return dense(self.channels, self.offsets, self.shape[2]).reshape(self.shape).view(np.bool_)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Patterns):
@@ -193,11 +194,20 @@ def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.in
     return np.nonzero(raster)[1].astype(np.int32), offsets
 
 
-def dense(channels: NDArray[Any], offsets: NDArray[Any], n_inputs: int) -> NDArray[np.bool_]:
-    """The bool raster (bins, channels) of sparse events."""
-    raster = np.zeros((len(offsets) - 1, n_inputs), np.bool_)
-    raster[np.repeat(np.arange(len(raster)), np.diff(offsets)), channels] = True
+def dense(
+    channels: NDArray[Any], offsets: NDArray[Any], n_inputs: int, silent_bins: int = 0
+) -> NDArray[np.int8]:
+    """The raster of sparse events, int8 (bins + silent_bins, channels), as a new array."""
+    raster = np.zeros((len(offsets) - 1 + silent_bins, n_inputs), np.int8)
+    _scatter(channels, offsets, raster)
     return raster
+
+
+@compiled
+def _scatter(channels: NDArray[Any], offsets: NDArray[Any], raster: NDArray[Any]) -> None:
+    for t in range(offsets.size - 1):
+        for e in range(offsets[t], offsets[t + 1]):
+            raster[t, channels[e]] = 1
 
 
 class World(NamedTuple):

@@ -10,8 +10,9 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from gnm_env.checks import whole
-from gnm_env.sampling import append_trial, new_buffers
-from gnm_env.task import Patterns, Task, dense, sparse, world
+from gnm_env.compiled import compiled
+from gnm_env.sampling import append_trial
+from gnm_env.task import Patterns, Task, World, dense, sparse, world
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Trial:
 
     def dense(self) -> NDArray[np.bool_]:
         """The raster as a new bool array (T, N)."""
-        return dense(self.channels, self.offsets, self.n_inputs)
+        return dense(self.channels, self.offsets, self.n_inputs).view(np.bool_)
 
     def owner(self) -> NDArray[np.int64]:
         """For each bin the number of the occurrence that it belongs to, −1 in noise; (T,)."""
@@ -163,17 +164,32 @@ def draw_trial(task: Task, patterns: Patterns, rng: Generator) -> Trial:
     bin chosen uniformly; T = background_bins + M·Σ k_c. The environments draw the same trials from
     the same generator.
     """
-    numbers = world(task, patterns)
+    channels, offsets, onsets, classes, targets = _draw(rng, world(task, patterns))
+    return Trial(channels, offsets, onsets, classes, targets, task.n_inputs, task.pattern_bins)
+
+
+@compiled
+def _draw(
+    rng: Generator, world: World
+) -> tuple[
+    NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
+]:
+    """Channels, offsets, onsets, classes and targets of one trial, in arrays of their own."""
     channels, offsets, onsets, classes, n_bins, n_occurrences, _ = append_trial(
-        rng, numbers, *new_buffers(), 0, 0
+        rng,
+        world,
+        np.empty(256, np.int32),
+        np.zeros(512, np.int64),
+        np.empty(8, np.int64),
+        np.empty(8, np.int64),
+        0,
+        0,
     )
     classes = classes[:n_occurrences].copy()
-    return Trial(
+    return (
         channels[: offsets[n_bins]].copy(),
         offsets[: n_bins + 1].copy(),
         onsets[:n_occurrences].copy(),
         classes,
-        numbers.targets[classes],
-        task.n_inputs,
-        task.pattern_bins,
+        world.targets[classes],
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gnm_env.checks import choice, real
 from gnm_env.pattern_env import PatternEnv, spike_from
-from gnm_env.task import Patterns, Task
+from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_trial
 
 FEEDBACK = ("cost", "sign", "dense")
@@ -54,7 +54,8 @@ class PatternTrialEnv(PatternEnv):
     ## Episode End
     `terminated` after the answer for the last bin; never truncated. The terminal `info`, and no
     other, holds `label`, `emitted`, `onsets` (first bin of each occurrence in the trial), `classes`
-    (from 0), `targets` (owed by each occurrence) and `pattern_bins`.
+    (from 0), `targets` (owed by each occurrence) and `pattern_bins`. The three of one entry per
+    occurrence are lists: vector environments of any kind can then hold trials side by side.
 
     ## Arguments
     - `task`: a `Task`; or its fields as keywords, `gym.make(id, n_classes=2, rate=0.01)`.
@@ -87,6 +88,8 @@ class PatternTrialEnv(PatternEnv):
         self.max_output = real("max_output", max_output, above=0.0)
         self.tolerance = real("tolerance", tolerance, low=0.0)
         self._graded = self.output == "graded"
+        self._ahead: list[NDArray[np.int8]] = []
+        """The bins not yet shown, the next one last; empty while no trial is under way."""
         if self._graded:
             self.action_space = spaces.Box(0.0, self.max_output, (1,), np.float64)
 
@@ -98,7 +101,7 @@ class PatternTrialEnv(PatternEnv):
         if trial is None:
             trial = draw_trial(self.task, self.patterns, self.np_random)
         self._begin(trial)
-        return self._rows[0], {}
+        return self._ahead.pop(), {}
 
     def _begin(self, trial: Trial) -> None:
         expected = (self.task.n_inputs, self.task.pattern_bins)
@@ -115,13 +118,9 @@ class PatternTrialEnv(PatternEnv):
         self.trial = trial
         # One row more than bins: the zeros that follow the last answer. A new array every trial, so
         # that rows handed out earlier stay as they were.
-        raster = np.zeros((trial.n_bins + 1, trial.n_inputs), np.int8)
-        raster[:-1] = trial.dense()
-        self._rows = list(raster)
-        self._bin = 0
-        self._last_bin = trial.n_bins - 1
+        self._raster = dense(trial.channels, trial.offsets, trial.n_inputs, silent_bins=1)
+        self._ahead = list(self._raster[::-1])
         self._emitted: float = 0.0 if self._graded else 0
-        self._running = True
         # Who owns each bin is needed bin by bin only for dense feedback and for pictures.
         track = self.feedback == "dense" or self._scroll is not None
         self._owner = trial.owner() if track else None
@@ -130,21 +129,20 @@ class PatternTrialEnv(PatternEnv):
             self._scroll.clear()
 
     def step(self, action: Any) -> tuple[NDArray[np.int8], float, bool, bool, dict[str, Any]]:
-        if not self._running:
-            self._require_running()
+        ahead = self._ahead
+        if not ahead:
+            self._require_reset()
         # Plain ints, as most loops send them, skip the slower general check.
-        if self._graded or type(action) is not int or action not in (0, 1):
+        if type(action) is not int or not 0 <= action <= 1 or self._graded:
             action = self._amount_from(action) if self._graded else spike_from(action)
-        t = self._bin
-        reward = 0.0 if self._owner is None else self._account(t, action)
+        reward = 0.0 if self._owner is None else self._account(action)
         self._emitted += action
-        self._bin = t + 1
-        if t < self._last_bin:
-            return self._rows[t + 1], reward, False, False, {}
-        self._running = False
+        row = ahead.pop()
+        if ahead:
+            return row, reward, False, False, {}
         if self.feedback != "dense":
             reward = self._aggregate_feedback()
-        return self._rows[t + 1], reward, True, False, self._terminal_info()
+        return row, reward, True, False, self._terminal_info()
 
     def _amount_from(self, action: Any) -> float:
         amount = np.asarray(action, np.float64)
@@ -154,38 +152,39 @@ class PatternTrialEnv(PatternEnv):
             )
         return float(amount.item())
 
-    def _account(self, t: int, output: float) -> float:
-        """Dense feedback for bin t; also shows the bin to the picture."""
+    def _account(self, output: float) -> float:
+        """Dense feedback for the bin shown last; also shows that bin to the picture."""
         assert self._owner is not None
+        t = self.trial.n_bins - len(self._ahead)
         owner = self._owner[t]
         if self._scroll is not None:
             class_ = int(self.trial.classes[owner]) if owner >= 0 else -1
-            self._scroll.push(self._rows[t], class_, output, self.potential)
+            self._scroll.push(self._raster[t], class_, output, self.potential)
         if self.feedback != "dense":
             return 0.0
         if owner < 0:
-            return -float(output)
+            return 0.0 - output
         self._in_occurrence += output
         if t + 1 < self.trial.onsets[owner] + self.trial.pattern_bins:
             return 0.0
         error = self._beyond_tolerance(float(self.trial.targets[owner]) - self._in_occurrence)
         self._in_occurrence = 0
-        return -abs(error)
+        return 0.0 - abs(error)
 
     def _beyond_tolerance(self, error: float) -> float:
         return error if abs(error) > self.tolerance else 0.0
 
     def _aggregate_feedback(self) -> float:
         error = self._beyond_tolerance(float(self.trial.label - self._emitted))
-        return float(np.sign(error)) if self.feedback == "sign" else -abs(error)
+        return float(np.sign(error)) if self.feedback == "sign" else 0.0 - abs(error)
 
     def _terminal_info(self) -> dict[str, Any]:
         trial = self.trial
         return {
             "label": trial.label,
             "emitted": self._emitted,
-            "onsets": trial.onsets,
-            "classes": trial.classes,
-            "targets": trial.targets,
+            "onsets": trial.onsets.tolist(),
+            "classes": trial.classes.tolist(),
+            "targets": trial.targets.tolist(),
             "pattern_bins": trial.pattern_bins,
         }
