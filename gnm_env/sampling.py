@@ -44,17 +44,31 @@ def append_noise(
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Append `n_bins` bins of noise, the first of them bin `bin_`. Each bit is Bernoulli(p)."""
     offsets = grown(offsets, bin_ + n_bins + 1)
+    return _noise_into(rng, world, n_bins, channels, offsets, bin_), offsets
+
+
+@compiled
+def _noise_into(
+    rng: Generator,
+    world: World,
+    n_bins: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> NDArray[np.int32]:
+    """`append_noise` where `offsets` is long enough; returns `channels` or its longer copy."""
     for t in range(bin_, bin_ + n_bins):
         offsets[t + 1] = 0
-    position, n_events, done = -1, offsets[bin_], False
+    position, n_events, done = _fill_noise(
+        rng, world, n_bins, channels, offsets, bin_, -1, offsets[bin_]
+    )
     while not done:
+        channels = grown(channels, channels.size + 1)
         position, n_events, done = _fill_noise(
             rng, world, n_bins, channels, offsets, bin_, position, n_events
         )
-        if not done:
-            channels = grown(channels, channels.size + 1)
     _accumulate(offsets, bin_, n_bins)
-    return channels, offsets
+    return channels
 
 
 @compiled
@@ -109,21 +123,43 @@ def append_pattern(
     bin_: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Append one occurrence of pattern `class_`, its first bin being bin `bin_`."""
+    offsets = grown(offsets, bin_ + world.pattern_bins + 1)
+    channels = grown(channels, offsets[bin_] + _pattern_spikes(world, class_))
+    _pattern_into(rng, world, class_, channels, offsets, bin_)
+    return channels, offsets
+
+
+@compiled
+def _pattern_spikes(world: World, class_: int) -> int:
+    """Number of spikes of pattern `class_`."""
+    bins = world.pattern_bins
+    return world.pattern_offsets[(class_ + 1) * bins] - world.pattern_offsets[class_ * bins]
+
+
+@compiled
+def _pattern_into(
+    rng: Generator,
+    world: World,
+    class_: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> None:
+    """`append_pattern` where both buffers are long enough."""
     bins = world.pattern_bins
     first = world.pattern_offsets[class_ * bins]
     last = world.pattern_offsets[(class_ + 1) * bins]
-    offsets = grown(offsets, bin_ + bins + 1)
     n_events = offsets[bin_]
-    channels = grown(channels, n_events + last - first)
     if world.jitter_bins == 0 and world.deletion == 0.0:
         for e in range(first, last):
             channels[n_events + e - first] = world.pattern_channels[e]
         for m in range(1, bins + 1):
             offsets[bin_ + m] = n_events + world.pattern_offsets[class_ * bins + m] - first
-        return channels, offsets
+        return
 
     cells = _noisy_cells(rng, world, class_)
-    offsets[bin_ + 1 : bin_ + bins + 1] = 0
+    for m in range(1, bins + 1):
+        offsets[bin_ + m] = 0
     for k in range(cells.size):
         # Two spikes moved onto one cell are one spike: the raster stays binary.
         if k > 0 and cells[k] == cells[k - 1]:
@@ -133,7 +169,6 @@ def append_pattern(
         n_events += 1
         offsets[bin_ + m + 1] += 1
     _accumulate(offsets, bin_, bins)
-    return channels, offsets
 
 
 @compiled
@@ -160,6 +195,21 @@ def _noisy_cells(rng: Generator, world: World, class_: int) -> NDArray[np.int64]
 
 
 @compiled
+def _sort(values: NDArray[np.int64], start: int, stop: int) -> None:
+    """Sort values[start:stop] in place; few values, as trials have, without any allocation."""
+    if stop - start > 64:
+        values[start:stop] = np.sort(values[start:stop])
+        return
+    for k in range(start + 1, stop):
+        value = values[k]
+        place = k
+        while place > start and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+
+
+@compiled
 def append_trial(
     rng: Generator,
     world: World,
@@ -178,38 +228,45 @@ def append_trial(
     of the occurrence that follow the trial's last, and the aggregate label.
     """
     # Where (background bin) and which (class), in one number: its order is the order in the trial.
-    n_occurrences = 0
-    keys = np.empty(4 * world.n_classes, np.int64)
+    # The numbers wait in `onsets` until the trial is laid out.
+    end = occurrence
     label = 0
     for class_ in range(world.n_classes):
         count = rng.poisson(world.mean_occurrences)
         label += count * world.targets[class_]
-        keys = grown(keys, n_occurrences + count)
-        for k in range(n_occurrences, n_occurrences + count):
-            keys[k] = int(rng.random() * world.background_bins) * world.n_classes + class_
-        n_occurrences += count
-    keys = np.sort(keys[:n_occurrences])
+        if end + count > onsets.size:
+            onsets = grown(onsets, end + count)
+            classes = grown(classes, onsets.size)
+        for k in range(end, end + count):
+            onsets[k] = int(rng.random() * world.background_bins) * world.n_classes + class_
+        end += count
+    _sort(onsets, occurrence, end)
 
-    onsets = grown(onsets, occurrence + n_occurrences)
-    classes = grown(classes, occurrence + n_occurrences)
+    # Room for everything but an unusual amount of noise, so that buffers are seldom replaced.
+    n_bins = world.background_bins + (end - occurrence) * world.pattern_bins
+    offsets = grown(offsets, bin_ + n_bins + 1)
+    noise = -np.expm1(-world.hazard) * world.background_bins * world.n_inputs
+    events = offsets[bin_] + int(noise + 6.0 * np.sqrt(noise)) + 16
+    for k in range(occurrence, end):
+        class_ = onsets[k] % world.n_classes
+        events += _pattern_spikes(world, class_)
+    channels = grown(channels, events)
     t = bin_
     noise_done = 0
-    for k in range(n_occurrences):
-        before = keys[k] // world.n_classes
-        class_ = keys[k] - before * world.n_classes
+    for k in range(occurrence, end):
+        before = onsets[k] // world.n_classes
+        class_ = onsets[k] - before * world.n_classes
         if before > noise_done:
-            channels, offsets = append_noise(rng, world, before - noise_done, channels, offsets, t)
+            channels = _noise_into(rng, world, before - noise_done, channels, offsets, t)
             t += before - noise_done
             noise_done = before
-        onsets[occurrence + k] = t - bin_
-        classes[occurrence + k] = class_
-        channels, offsets = append_pattern(rng, world, class_, channels, offsets, t)
+        onsets[k] = t - bin_
+        classes[k] = class_
+        _pattern_into(rng, world, class_, channels, offsets, t)
         t += world.pattern_bins
-    channels, offsets = append_noise(
-        rng, world, world.background_bins - noise_done, channels, offsets, t
-    )
+    channels = _noise_into(rng, world, world.background_bins - noise_done, channels, offsets, t)
     t += world.background_bins - noise_done
-    return channels, offsets, onsets, classes, t, occurrence + n_occurrences, label
+    return channels, offsets, onsets, classes, t, end, label
 
 
 @compiled
