@@ -472,41 +472,59 @@ def foresee_template(
     return actions
 
 
-@functools.cache
-def kernels(neuron: type[Neuron], rule: type[Rule], double_trace: bool, width: int) -> Any:
-    """The compiled loops for one kind of neuron and rule, `width` neurons side by side.
+def kernels(neuron: Neuron, rule: Rule, width: int = 1) -> Any:
+    """The compiled loops for neurons and rules such as these, `width` neurons side by side.
 
-    Compiled at their first call and kept on disk. The loops that do not learn are compiled with the
-    rule's name all the same: they share `run_trial` with those that do.
+    Compiled at their first call and kept on disk.
     """
-    of_neuron = {
-        "WIDTH": width,
-        "Parameters": neuron.parameters_type,
-        "State": neuron.state_type,
-        "step": neuron.step,
-    }
+    return _kernels(
+        *neuron.step(), type(neuron), type(rule), rule.trace(neuron).double, width
+    )
+
+
+@functools.cache
+def _kernels(
+    name: str, step: Any, neuron: type[Neuron], rule: type[Rule], double: bool, width: int
+) -> Any:
+    of_neuron = _neuron_bindings(step, neuron, width)
     of_rule = {
+        "WIDTH": width,
         "USES_ERROR": rule.uses_error,
-        "DOUBLE_TRACE": double_trace,
+        "DOUBLE_TRACE": double,
         "correction": rule.correction,
         "teaching_signal": rule.teaching_signal,
         "weight_change": rule.weight_change,
     }
-    name = f"{neuron.name}_{width}"
-    full_name = f"{neuron.name}_{rule.name}_{'double' if double_trace else 'single'}_{width}"
-    bins = specialise(run_bins_template, full_name, **of_neuron, **of_rule)
-    trial = specialise(run_trial_template, full_name, run_bins=bins, **of_neuron)
-    learn = specialise(learn_trial_template, full_name, WIDTH=width, **of_rule)
+    alone = f"{name}_{width}"
+    together = f"{name}_{rule.name}_{'double' if double else 'single'}_{width}"
+    bins = specialise(run_bins_template, together, **of_neuron, USES_ERROR=rule.uses_error)
+    trial = specialise(run_trial_template, together, **of_neuron, run_bins=bins)
+    learn = specialise(learn_trial_template, together, **of_rule)
     all_ = {**of_neuron, **of_rule, "run_trial": trial, "learn_trial": learn}
     return SimpleNamespace(
-        train=specialise(train_template, full_name, **all_),
-        answer=specialise(answer_template, full_name, **all_),
-        study=specialise(study_template, full_name, **all_),
-        survive=specialise(survive_template, name, **of_neuron),
-        record=specialise(record_template, name, **of_neuron),
-        hear=specialise(hear_template, name, **of_neuron),
-        foresee=specialise(foresee_template, name, **of_neuron),
+        train=specialise(train_template, together, **all_),
+        answer=specialise(answer_template, together, **all_),
+        study=specialise(study_template, together, **all_),
+        survive=specialise(survive_template, alone, **of_neuron),
+        hear=specialise(hear_template, alone, **of_neuron),
+        foresee=specialise(foresee_template, alone, **of_neuron),
     )
 
 
-__all__ = ["MOST_SPIKES", "Heard", "Log", "kernels"]
+def recorder(neuron: Neuron) -> Any:
+    """The compiled loop that notes every variable of a neuron such as this."""
+    return _recorder(*neuron.recording_step(), type(neuron))
+
+
+@functools.cache
+def _recorder(name: str, step: Any, neuron: type[Neuron]) -> Any:
+    return specialise(record_template, name, **_neuron_bindings(step, neuron, 1))
+
+
+def _neuron_bindings(step: Any, neuron: type[Neuron], width: int) -> dict[str, Any]:
+    return {
+        "WIDTH": width,
+        "Parameters": neuron.parameters_type,
+        "State": neuron.state_type,
+        "step": step,
+    }

@@ -12,7 +12,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from agents import checkpoint
-from agents.kernels import Heard, Log, kernels
+from agents.kernels import Heard, Log, kernels, recorder
 from agents.learning.aggregate_label import AggregateLabel
 from agents.learning.error_trace import ErrorTrace
 from agents.learning.rule import Rule
@@ -81,8 +81,7 @@ class NeuronAgent:
         self._prepare()
 
     def _prepare(self) -> None:
-        trace = self.rule.trace(self.neuron)
-        self._kernels = kernels(type(self.neuron), type(self.rule), trace.double, 1)
+        self._kernels = kernels(self.neuron, self.rule)
         self._mode = self.neuron.mode()
         self._parameters = np.array(self.neuron.parameters())[:, None]
         self._rule_parameters = np.array(self.rule_parameters())[:, None]
@@ -223,8 +222,8 @@ class NeuronAgent:
         heard = Heard(
             trial.channels, trial.offsets, trial.onsets, trial.targets, trial.pattern_bins
         )
-        values, spikes = self._kernels.record(
-            self.neuron.recording_mode(), self._parameters, self._weights[:, None], heard
+        values, spikes = recorder(self.neuron)(
+            self._mode, self._parameters, self._weights[:, None], heard
         )
         return Recording(*values, spikes)
 
@@ -242,10 +241,10 @@ class NeuronAgent:
 
     def group_key(self) -> Hashable:
         """Agents with equal keys can be trained side by side."""
+        step, _ = self.neuron.step()
         double = self.rule.trace(self.neuron).double
         return (
-            type(self), type(self.neuron), self._mode, type(self.rule), self.rule_mode, double,
-            self.n_inputs,
+            type(self), step, self._mode, type(self.rule), self.rule_mode, double, self.n_inputs,
         )  # fmt: skip
 
     @classmethod

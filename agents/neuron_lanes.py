@@ -39,8 +39,7 @@ class NeuronLanes:
                     f"got {agent.n_inputs}"
                 )
         self._width = width_for(len(self._agents))
-        trace = first.rule.trace(first.neuron)
-        self._kernels = kernels(type(first.neuron), type(first.rule), trace.double, self._width)
+        self._kernels = kernels(first.neuron, first.rule, self._width)
         self._mode, self._rule_mode = first.neuron.mode(), first.rule_mode
         self._parameters = self._blocks([a.neuron.parameters() for a in self._agents])
         self._rule_parameters = self._blocks([a.rule_parameters() for a in self._agents])

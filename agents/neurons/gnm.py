@@ -9,12 +9,15 @@ from typing import Any, ClassVar, NamedTuple
 from agents.lanes import any_lane, like, negated, power, where
 from agents.neurons.neuron import Neuron, Response, Trace
 from gnm_env.checks import choice, real
-from gnm_env.compiled import compiled
+from gnm_env.compiled import compiled, specialise
+
+LARGEST_WHOLE = 4096
+"""Largest exponent that is raised by repeated squaring; above it `pow` is as good."""
 
 # How R is computed: not at all, or by a Hill function whose exponent is whole, infinite or real.
-_NO_RECOVERY, _WHOLE, _STEP, _REAL = range(4)
-_LARGEST_WHOLE = 4096
-"""Largest exponent that is raised by repeated squaring; above it `pow` is as good."""
+# Each way is a step of its own, so that a neuron pays for no other; `_steps` binds the name.
+NONE, WHOLE, INFINITE, REAL = "none", "whole", "infinite", "real"
+RECOVERY = NONE
 
 
 class Parameters(NamedTuple):
@@ -51,25 +54,28 @@ def whole_power(x: Any, exponent: int) -> Any:
     return result
 
 
-@compiled
-def hill(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
+def hill_template(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
     """H(V) = V^h / (ϑ_B^h + V^h), 0 for V <= 0; a step with ½ at V = ϑ_B for infinite h.
 
     Far from ϑ_B the function is flat to within rounding, and the power is not computed.
     """
-    if mode[1] == _STEP:
-        return where(p.theta_b < V, 1.0, where(p.theta_b == V, 0.5, like(0.0, V)))
+    if RECOVERY == INFINITE:
+        return where(V > p.theta_b, 1.0, where(V == p.theta_b, 0.5, like(0.0, V)))
     u = V / p.theta_b
     H = where(u > 1.0, 1.0, like(0.0, V))
     steep = (u > p.flat_below) & (u < p.flat_above)
     if any_lane(steep):
-        u_h = whole_power(u, mode[2]) if mode[1] == _WHOLE else power(u, p.h)
+        u_h = whole_power(u, mode[1]) if RECOVERY == WHOLE else power(u, p.h)
         H = where(steep, u_h / (1.0 + u_h), H)
     return H
 
 
-@compiled
-def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tuple[State, Response]:
+hill: Any = hill_template
+
+
+def step_template(
+    p: Parameters, mode: tuple[int, ...], state: State, drive: Any
+) -> tuple[State, Response]:
     """One bin. With everything on the right taken at t−1 but the input I(t):
 
     D(t) = ηγ R V + (1−η)α V,  V(t) = V + I(t) − D(t),  R(t) = R + ζ H(V) − β R;
@@ -77,14 +83,22 @@ def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tupl
     """
     R = state.R
     D = p.leak * state.V
-    if mode[1] != _NO_RECOVERY:
+    if RECOVERY != NONE:
         D = p.eta_gamma * state.R * state.V + D
         R = state.R + p.zeta * hill(p, mode, state.V) - p.beta * state.R
     V = state.V + drive - D
     X = V if mode[0] == 0 else D
-    above = p.theta_r <= X
-    spike = above & negated(p.theta_r <= state.X)
+    above = X >= p.theta_r
+    spike = above & negated(state.X >= p.theta_r)
     return State(V, R, X), Response(V, D, R, X, above, spike)
+
+
+def _bound(recovery: str) -> Any:
+    hill = specialise(hill_template, recovery, RECOVERY=recovery)
+    return specialise(step_template, recovery, RECOVERY=recovery, hill=hill)
+
+
+STEPS = {recovery: _bound(recovery) for recovery in (NONE, WHOLE, INFINITE, REAL)}
 
 
 @dataclass(frozen=True)
@@ -120,7 +134,6 @@ class GNM(Neuron):
     default_initial_weight: ClassVar[float] = 0.1
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
-    step: ClassVar[Any] = step
 
     def __post_init__(self) -> None:
         for name in ("alpha", "eta", "beta"):
@@ -150,16 +163,20 @@ class GNM(Neuron):
         )
 
     def mode(self) -> tuple[int, ...]:
-        return self._mode(_NO_RECOVERY) if self.eta == 0.0 else self.recording_mode()
+        """Whether the readout is D, and the exponent where it is whole."""
+        return (int(self.readout == "D"), int(self.h) if self._recovery() == WHOLE else 0)
 
-    def recording_mode(self) -> tuple[int, ...]:
+    def step(self) -> tuple[str, Any]:
+        return ("gnm_none", STEPS[NONE]) if self.eta == 0.0 else self.recording_step()
+
+    def recording_step(self) -> tuple[str, Any]:
+        recovery = self._recovery()
+        return f"gnm_{recovery}", STEPS[recovery]
+
+    def _recovery(self) -> str:
         if math.isinf(self.h):
-            return self._mode(_STEP)
-        whole = self.h <= _LARGEST_WHOLE and self.h == int(self.h)
-        return self._mode(_WHOLE if whole else _REAL)
-
-    def _mode(self, recovery: int) -> tuple[int, ...]:
-        return (int(self.readout == "D"), recovery, int(self.h) if recovery == _WHOLE else 0)
+            return INFINITE
+        return WHOLE if self.h <= LARGEST_WHOLE and self.h == int(self.h) else REAL
 
     def trace(self) -> Trace:
         return Trace(1.0 - (1.0 - self.eta) * self.alpha)

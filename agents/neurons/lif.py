@@ -54,7 +54,6 @@ class LIF(Neuron):
     default_initial_weight: ClassVar[float] = 0.1
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
-    step: ClassVar[Any] = step
 
     def __post_init__(self) -> None:
         real("alpha", self.alpha, low=0.0, high=1.0)
@@ -64,6 +63,9 @@ class LIF(Neuron):
     @property
     def threshold(self) -> float:
         return self.theta
+
+    def step(self) -> tuple[str, Any]:
+        return "lif", step
 
     def parameters(self) -> tuple[float, ...]:
         return (self.alpha, self.theta, float(self.refractory))

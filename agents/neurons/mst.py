@@ -66,7 +66,6 @@ class MST(Neuron):
     default_initial_weight: ClassVar[float] = 0.02
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
-    step: ClassVar[Any] = step
 
     def __post_init__(self) -> None:
         real("tau_m", self.tau_m, above=0.0)
@@ -87,6 +86,9 @@ class MST(Neuron):
         """V_norm = k^(k/(k−1)) / (k−1) with k = τ_m/τ_s."""
         k = self.tau_m / self.tau_s
         return float(k ** (k / (k - 1.0)) / (k - 1.0))
+
+    def step(self) -> tuple[str, Any]:
+        return "mst", step
 
     def parameters(self) -> tuple[float, ...]:
         trace = self.trace()

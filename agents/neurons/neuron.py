@@ -8,7 +8,8 @@ A neuron is one file beside this one. It holds
 - `step(p, mode, state, drive) -> (state, Response)`: one bin, compiled, for one neuron or for many
   side by side (see `agents.lanes`). `drive` is I(t), the weighted input of the bin.
 
-The dataclass names the three in `parameters_type`, `state_type` and `step`.
+The dataclass names the two types in `parameters_type` and `state_type`; its method `step` gives the
+compiled step that suits its parameters.
 """
 
 from __future__ import annotations
@@ -53,7 +54,6 @@ class Neuron(ABC):
     default_initial_weight: ClassVar[float]
     parameters_type: ClassVar[type]
     state_type: ClassVar[type]
-    step: ClassVar[Any]
 
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
@@ -68,10 +68,14 @@ class Neuron(ABC):
     def threshold(self) -> float:
         """The readout's threshold for an output spike."""
 
+    @abstractmethod
+    def step(self) -> tuple[str, Any]:
+        """The compiled step, and a name that tells it from every other step."""
+
+    def recording_step(self) -> tuple[str, Any]:
+        """The step that computes every variable, also those that do not act back."""
+        return self.step()
+
     def mode(self) -> tuple[int, ...]:
         """Switches of the step that are not numbers; neurons side by side must share them."""
         return (0,)
-
-    def recording_mode(self) -> tuple[int, ...]:
-        """The mode in which every variable is computed, also those that do not act back."""
-        return self.mode()
