@@ -21,7 +21,7 @@ def software() -> str:
 
 @functools.cache
 def commit() -> str:
-    """The checkout's git commit, with "+" where tracked files differ from it; "unknown" without git."""
+    """The checkout's git commit, "+" added where tracked files differ; "unknown" without git."""
     try:
         return _git("rev-parse", "HEAD") + ("+" if _git("status", "-s", "-uno") else "")
     except (OSError, subprocess.SubprocessError):

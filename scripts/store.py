@@ -3,11 +3,11 @@
 A store is a folder:
 
     F3/data.zarr       the Dataset; one chunk of every array per block of work
-    F3/journal.jsonl   one line per finished block: its files with their SHA-256, seconds, host, commit
+    F3/journal.jsonl   one line per finished block: its files' SHA-256, seconds, host, commit
     F3.lock            held while a process writes
 
-A block counts as done once its line is in the journal, which is after its last chunk is on disk. So a
-process may be killed at any moment: what has no line is computed again, to the same values. Every
+A block counts as done once its line is in the journal, which is after its last chunk is on disk. So
+a process may be killed at any moment: what has no line is computed again, to the same values. Every
 opening compares all files with their checksums.
 """
 
@@ -98,7 +98,7 @@ class Store:
                     f"block {block.number} must give {variable.name} of shape {expected}, "
                     f"got {'nothing' if array is None else array.shape}"
                 )
-            self._group[variable.name][block.region] = array.astype(variable.dtype)
+            self._array(variable.name)[block.region] = array.astype(variable.dtype)
             path = self._chunk(block, variable.name)
             files[path] = _digest(self.folder / DATA / path)
         entry = {
@@ -115,8 +115,11 @@ class Store:
             journal.write(json.dumps(entry) + "\n")
         self._done.add(block.number)
 
+    def _array(self, name: str) -> Any:
+        return self._group[name]
+
     def _chunk(self, block: Block, name: str) -> str:
-        array = self._group[name]
+        array = self._array(name)
         place = [first // axis.step for axis, (first, _) in
                  zip(self.experiment.axes, block.box, strict=True)]  # fmt: skip
         place += [0] * (array.ndim - len(place))
@@ -127,9 +130,9 @@ class Store:
 def open_store(folder: Path, experiment: Experiment, *, repair: bool = False) -> Iterator[Store]:
     """The store of `experiment` in `folder`, for this process alone; made where there is none.
 
-    With `repair`, damaged blocks are forgotten, so that they are pending again. Raises StoreError if
-    another process holds the store, if other settings made it, or if it is damaged; OSError if it
-    cannot be written.
+    With `repair`, damaged blocks are forgotten, so that they are pending again. Raises StoreError
+    if another process holds the store, if other settings made it, or if it is damaged; OSError if
+    it cannot be written.
     """
     with _locked(folder):
         if not folder.exists():
@@ -198,7 +201,8 @@ def _locked(folder: Path) -> Iterator[None]:
             handle.seek(0)
             owner = handle.read().strip() or "another process"
             raise StoreError(
-                f"{folder} is in use by {owner}: wait until it has finished, or choose another store"
+                f"{folder} is in use by {owner}: wait until it has finished, or choose another "
+                "store"
             ) from None
         handle.truncate(0)
         handle.write(f"process {os.getpid()} on {socket.gethostname()}\n")
@@ -245,7 +249,11 @@ def _lay_out(path: Path, experiment: Experiment) -> None:
 
 def _coordinates(experiment: Experiment) -> xr.Dataset:
     coordinates: dict[str, Any] = {
-        axis.name: (axis.name, _labels(axis.values), {"units": axis.units, "long_name": axis.long_name})
+        axis.name: (
+            axis.name,
+            _labels(axis.values),
+            {"units": axis.units, "long_name": axis.long_name},
+        )
         for axis in experiment.axes
     }
     for name, length in experiment.lengths.items():
@@ -279,12 +287,14 @@ def _entries(folder: Path) -> list[Entry]:
         lines = (folder / JOURNAL).read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:
         raise StoreError(
-            f"{folder} is not a store, it has no {JOURNAL}: choose another folder, or remove this one"
+            f"{folder} is not a store, it has no {JOURNAL}: choose another folder, or remove "
+            "this one"
         ) from None
     entries = [entry for entry in map(_parsed, lines) if entry is not None]
     if not entries or "store" not in entries[0]:
         raise StoreError(
-            f"the first line of {folder / JOURNAL} is damaged, so that the store's settings are not "
+            f"the first line of {folder / JOURNAL} is damaged, so that the store's settings are "
+            "not "
             f"known: remove {folder} and run its sweep again"
         )
     blocks = {entry["block"]: entry for entry in entries[1:]}
@@ -332,7 +342,7 @@ def _damage_report(folder: Path, damaged: list[tuple[Entry, str]]) -> str:
 def _mended(
     folder: Path, experiment: Experiment, entries: list[Entry], damaged: list[tuple[Entry, str]]
 ) -> list[Entry]:
-    """The journal without the damaged blocks; attributes and coordinates written anew if need be."""
+    """The journal without the damaged blocks; attributes and coordinates anew if need be."""
     bad = [entry for entry, _ in damaged]
     kept = [entry for entry in entries[1:] if entry not in bad]
     first = entries[0]

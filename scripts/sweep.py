@@ -1,7 +1,7 @@
 """Compute an experiment, block by block, into its store. May be stopped and started at will.
 
-    python scripts/sweep.py F3 --size quick
-    python scripts/sweep.py F3 --size paper --scheduler tcp://node1:8786
+python scripts/sweep.py F3 --size quick
+python scripts/sweep.py F3 --size paper --scheduler tcp://node1:8786
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def workers(
 
 
 def pattern_seeds(text: str) -> tuple[int, ...]:
-    """"10" means seeds 0 … 9, "3,5,8" these three, "10-19" these ten."""
+    """ "10" means seeds 0 … 9, "3,5,8" these three, "10-19" these ten."""
     try:
         if "," in text:
             seeds = tuple(int(part) for part in text.split(",") if part)

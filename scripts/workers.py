@@ -56,7 +56,7 @@ def cluster(address: str) -> Iterator[Executor]:
     Raises ValueError if Dask is not installed, or if no scheduler answers.
     """
     try:
-        import cloudpickle
+        import cloudpickle  # type: ignore[import-untyped]
         import distributed
     except ImportError:
         raise ValueError(
@@ -77,7 +77,7 @@ def cluster(address: str) -> Iterator[Executor]:
 def _knock(address: str) -> None:
     """Raise ValueError unless a Dask scheduler answers at `address`.
 
-    A connection of its own: a Client that fails to connect complains once more when it is collected.
+    A connection of its own: a Client that cannot connect complains again when it is collected.
     """
     from distributed.comm import connect
 

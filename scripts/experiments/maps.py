@@ -6,7 +6,24 @@ from experiments.design import Axis, Experiment
 from experiments.training import class_counts, pattern_seeds, training
 
 ALPHA = {
-    "quick": (0.0, 0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
+    "quick": (
+        0.0,
+        0.025,
+        0.05,
+        0.075,
+        0.1,
+        0.15,
+        0.2,
+        0.25,
+        0.3,
+        0.4,
+        0.5,
+        0.6,
+        0.7,
+        0.8,
+        0.9,
+        1.0,
+    ),
     "paper": tuple(k / 40 for k in range(41)),
 }
 ETA = {"quick": tuple(k / 10 for k in range(11)), "paper": tuple(k / 40 for k in range(41))}

@@ -1,11 +1,11 @@
-"""F6, F7, BP and the reference table: neurons and learning rules side by side on the same streams."""
+"""F6, F7, BP and the reference table: neurons and rules side by side on the same streams."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from experiments.design import Axis, Experiment
-from experiments.training import STARTS, class_counts, methods, pattern_seeds, training
+from experiments.training import STARTS, class_counts, learners, pattern_seeds, training
 
 REFRACTORY = tuple(range(26))
 """Refractory periods of F6, in bins."""
@@ -17,7 +17,7 @@ MST_ALL = {"neuron": "mst", "rule": "all"}
 LIF_ALL = {"neuron": "lif", "rule": "all", "refractory": 0}
 MODULATED = {"rule": "et", "modulate": True}
 
-F7_METHODS = {
+F7_LEARNERS = {
     "MST, ALL": MST_ALL,
     "GNM, ALL": GNM_ALL,
     "GNM, ET": GNM_ET,
@@ -25,7 +25,7 @@ F7_METHODS = {
 }
 _PUBLISHED = {"start": "published"}
 
-TABLE_METHODS = {
+TABLE_LEARNERS = {
     "GNM, ALL": GNM_ALL,
     "GNM, ET": GNM_ET,
     "GNM, ET modulated": GNM_ET_MODULATED,
@@ -80,13 +80,13 @@ def _starts() -> Axis:
 def refractory(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """LIF neurons of every refractory period beside a GNM, one and three classes."""
     rows = {"GNM": GNM_ALL, **{f"LIF {n}": {**LIF_ALL, "refractory": n} for n in REFRACTORY}}
-    axes = (class_counts(1, 3), _seeds("F6", size, seeds), _starts(), methods(rows))
+    axes = (class_counts(1, 3), _seeds("F6", size, seeds), _starts(), learners(rows))
     return training("F6", "LIF against GNM, by refractory period", axes)
 
 
 def comparison(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """Neurons and rules on two classes, paired by pattern seed."""
-    axes = (class_counts(2), _seeds("F7", size, seeds), _starts(), methods(F7_METHODS))
+    axes = (class_counts(2), _seeds("F7", size, seeds), _starts(), learners(F7_LEARNERS))
     return training("F7", "Neurons and learning rules, two classes", axes)
 
 
@@ -98,5 +98,5 @@ def back_propagation(size: str, seeds: tuple[int, ...] | None = None) -> Experim
 
 def table(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """All neurons and rules on one to four classes."""
-    axes = (class_counts(1, 2, 3, 4), _seeds("table", size, seeds), methods(TABLE_METHODS))
+    axes = (class_counts(1, 2, 3, 4), _seeds("table", size, seeds), learners(TABLE_LEARNERS))
     return training("table", "Reference table", axes)

@@ -43,7 +43,7 @@ def training_seed(classes: Any, pattern_seed: Any) -> Any:
 
 
 def evaluation_seed(classes: Any, pattern_seed: Any) -> Any:
-    """Seed of the first evaluation stream. Run k hears that of this seed + k; runs stay below 1000."""
+    """Seed of evaluation run 0. Run k hears the stream of this seed + k; runs stay below 1000."""
     return 10_000_000 * classes + 1_000 * pattern_seed
 
 
@@ -74,7 +74,7 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
 
 
 def make_agent(setting: Setting, task: Task) -> Any:
-    """The untrained agent that a setting describes. Raises ValueError for a key that nothing takes."""
+    """The untrained agent that a setting describes; ValueError for a key that nothing takes."""
     kinds = _kinds(setting["neuron"], setting["rule"])
     taken = {field.name for kind in kinds for field in fields(kind)}
     unknown = sorted(set(setting) - taken - set(_PLACE))
@@ -145,9 +145,10 @@ def class_counts(*counts: int) -> Axis:
     return Axis("classes", counts, long_name="number of pattern classes")
 
 
-def methods(rows: Mapping[str, Mapping[str, Any]]) -> Axis:
-    """An axis of named combinations of neuron, rule and start, all in one block."""
-    return Axis("method", tuple(rows), chunk=0, settings=tuple(rows.values()), long_name="method")
+def learners(rows: Mapping[str, Mapping[str, Any]]) -> Axis:
+    """An axis of named combinations of neuron and rule, all in one block."""
+    names, settings = tuple(rows), tuple(rows.values())
+    return Axis("learner", names, chunk=0, settings=settings, long_name="neuron and learning rule")
 
 
 def _protocol(task: Task, axes: tuple[Axis, ...], common: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,7 +185,9 @@ def _seeds(axes: tuple[Axis, ...]) -> tuple[Coordinate, ...]:
     dims = ("classes", "pattern_seed")
     classes, seeds = np.meshgrid(*(by_name[dim] for dim in dims), indexing="ij")
     return (
-        Coordinate("training_seed", dims, training_seed(classes, seeds), "seed of the training stream"),
+        Coordinate(
+            "training_seed", dims, training_seed(classes, seeds), "seed of the training stream"
+        ),
         Coordinate(
             "evaluation_seed", dims, evaluation_seed(classes, seeds), "seed of evaluation run 0"
         ),

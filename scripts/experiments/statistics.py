@@ -1,0 +1,106 @@
+"""Numbers with their uncertainty. The sample is always the pattern seeds, the first axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+RESAMPLES = 2_000
+
+
+class Interval(NamedTuple):
+    """An estimate with its 95 % interval; the ends are NaN where one seed leaves none."""
+
+    value: float
+    low: float
+    high: float
+
+    def __format__(self, spec: str) -> str:
+        ends = (
+            f"{self.low:{spec}} … {self.high:{spec}}" if math.isfinite(self.low) else "no interval"
+        )
+        return f"{self.value:{spec}} [{ends}]"
+
+
+class Wins(NamedTuple):
+    """How often one of two paired methods was ahead."""
+
+    wins: int
+    pairs: int
+    low: float
+    """Ends of the exact 95 % interval of the share of wins, ties left out …"""
+    high: float
+    p: float
+    """… and p of the two-sided sign test."""
+
+    @property
+    def share(self) -> float:
+        """Wins per pair."""
+        return self.wins / self.pairs
+
+    def __str__(self) -> str:
+        return (
+            f"{self.wins} of {self.pairs} "
+            f"({self.share:.0%} [{self.low:.0%} … {self.high:.0%}], p = {self.p:.2g})"
+        )
+
+
+def score(results: xr.Dataset, cap: int | None = None) -> xr.DataArray:
+    """Noisy performance: bins survived, averaged over the runs; `cap` may lower the run's."""
+    survived = results["survived"]
+    return (survived if cap is None else survived.clip(max=cap)).mean("run")
+
+
+def by_seed(values: xr.DataArray) -> NDArray[np.float64]:
+    """The numbers with the pattern seeds as first axis."""
+    return values.transpose("pattern_seed", ...).to_numpy()
+
+
+def bootstrap(
+    statistic: Callable[..., float], *samples: ArrayLike, resamples: int = RESAMPLES
+) -> Interval:
+    """`statistic` of samples that share their first axis, with its percentile bootstrap interval.
+
+    The entries along that axis are drawn again together, so that pairs stay pairs.
+    """
+    arrays = [np.asarray(sample) for sample in samples]
+    seeds = np.arange(len(arrays[0]))
+    value = float(statistic(*arrays))
+    if len(seeds) < 2:
+        return Interval(value, math.nan, math.nan)
+    interval = stats.bootstrap(
+        (seeds,),
+        lambda drawn: statistic(*(array[drawn] for array in arrays)),
+        n_resamples=resamples,
+        vectorized=False,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return Interval(value, float(interval.low), float(interval.high))
+
+
+def mean(sample: ArrayLike) -> Interval:
+    """The mean with its interval."""
+    return bootstrap(np.mean, sample)
+
+
+def median(sample: ArrayLike) -> Interval:
+    """The median with its interval."""
+    return bootstrap(np.median, sample)
+
+
+def wins(first: ArrayLike, second: ArrayLike) -> Wins:
+    """How often `first` was ahead of `second`, seed by seed."""
+    difference = np.asarray(first) - np.asarray(second)
+    ahead, decided = int(np.sum(difference > 0)), int(np.sum(difference != 0))
+    if decided == 0:
+        return Wins(0, len(difference), 0.0, 1.0, 1.0)
+    test = stats.binomtest(ahead, decided, 0.5)
+    ends = test.proportion_ci(method="exact")
+    return Wins(ahead, len(difference), float(ends.low), float(ends.high), float(test.pvalue))

@@ -1,0 +1,70 @@
+"""A claim of the paper, the rule that judges it, and what came out.
+
+Rules are fixed before the runs that they judge, and a verdict follows from the numbers alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import xarray as xr
+
+REPRODUCED = "reproduced"
+NOT_REPRODUCED = "not reproduced"
+MISSING = "missing"
+
+Results = Mapping[str, xr.Dataset]
+"""Finished stores by the name of their experiment."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule found.
+
+    Attributes:
+        holds: whether the claim holds as it stands, under every protocol that it was tried under.
+        conditions: what it holds under, where it does not hold as it stands.
+        number: our number with its interval, in words.
+    """
+
+    holds: bool
+    conditions: Mapping[str, bool]
+    number: str
+
+    @property
+    def verdict(self) -> str:
+        """Reproduced, reproduced if …, or not reproduced."""
+        if self.holds:
+            return REPRODUCED
+        kept = [condition for condition, holds in self.conditions.items() if holds]
+        return f"{REPRODUCED} if {', or '.join(kept)}" if kept else NOT_REPRODUCED
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the report.
+
+    Attributes:
+        id: such as "F7b".
+        where: in the paper.
+        words: what the paper says.
+        protocol: what we ran.
+        rule: when it counts as reproduced, in words.
+        needs: experiments whose stores the rule reads.
+        environment: the task.
+        judge: the rule.
+    """
+
+    id: str
+    where: str
+    words: str
+    protocol: str
+    rule: str
+    needs: tuple[str, ...]
+    environment: str
+    judge: Callable[[Results], Finding]
+
+    def finding(self, results: Results) -> Finding | None:
+        """What the rule finds; None if a store that it needs is not there."""
+        return self.judge(results) if all(name in results for name in self.needs) else None
