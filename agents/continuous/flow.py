@@ -2,9 +2,9 @@
 
 Between input spikes V falls towards 0 without ever turning round, so that it crosses the readout
 threshold at most once, and downwards. For η = 0 V and S are known in closed form. For η > 0 the
-equations are solved by the classical Runge–Kutta method of order 4 in equal steps, each divided where
-the Hill function is steep; within a step V is the cubic that has V and dV/dt right at both ends
-(order 4 as well), which gives the area under V and the time of a crossing.
+equations are solved by the classical Runge–Kutta method of order 4 in equal steps, divided where the
+Hill function is steep; within a step V is the cubic that has V and dV/dt right at both ends (order 4
+as well), which gives the area under V and the time of a crossing.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from agents.neurons.gnm import Parameters as HillParameters
-from agents.neurons.gnm import hill
-from gnm_env.compiled import compiled
+from agents.neurons.gnm import REAL, WHOLE, hill_template
+from agents.neurons.gnm import Parameters as Rates
+from gnm_env.compiled import compiled, specialise
 
-CLOSED_FORM, STEP = 0, 2
-"""Values of mode[1], as in `agents.neurons.gnm`: no R (η = 0); H a step. Others: H is smooth."""
+CLOSED_FORM, SMOOTH_WHOLE, SMOOTH, STEP = range(4)
+"""mode[0]: η = 0; η > 0 with an exponent of the Hill function that is whole, real, infinite."""
 
 STEPS_PER_BIN = 8
 """Runge–Kutta steps per bin. What they are good for is measured in the documentation."""
@@ -28,8 +28,8 @@ _PIECES = 2.0
 _HALVINGS = 50
 """Bisections of a step to find a crossing: to rounding."""
 
-Rates = HillParameters
-"""The numbers of the equations: those of the discrete neuron, now rates per bin."""
+_hill_whole = specialise(hill_template, f"{WHOLE}_flow", RECOVERY=WHOLE)
+_hill_real = specialise(hill_template, f"{REAL}_flow", RECOVERY=REAL)
 
 
 class Between(NamedTuple):
@@ -58,9 +58,9 @@ def slopes(rates: Rates, H: float, V: float, R: float) -> tuple[float, float]:
 @compiled
 def _activation(rates: Rates, mode: tuple[int, ...], above: bool, V: float) -> float:
     """H(V); for an infinite exponent the caller says on which side of the step V is."""
-    if mode[1] == STEP:
+    if mode[0] == STEP:
         return 1.0 if above else 0.0
-    return hill(rates, mode, V)
+    return _hill_whole(rates, mode, V) if mode[0] == SMOOTH_WHOLE else _hill_real(rates, mode, V)
 
 
 @compiled
@@ -107,21 +107,23 @@ def _crossing(V: float, V_end: float, d: float, d_end: float, level: float) -> f
 
 
 @compiled
-def _step(rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float) -> tuple[float, float, float]:
+def _step(
+    rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float
+) -> tuple[float, float, float]:
     """One step of length dt, or up to the step of H if V falls through it: V, R, S, time left."""
-    above = V > rates.theta_b
+    above = rates.theta_b < V
     V_end, R_end = _runge_kutta(rates, mode, above, V, R, dt)
     d, _ = slopes(rates, 0.0, V, R)
     d_end, _ = slopes(rates, 0.0, V_end, R_end)
     left = 0.0
-    if mode[1] == STEP and above and V_end < rates.theta_b:
+    if mode[0] == STEP and above and V_end < rates.theta_b:
         part = _crossing(V, V_end, d * dt, d_end * dt, rates.theta_b) * dt
         left, dt = dt - part, part
         _, R_end = _runge_kutta(rates, mode, above, V, R, dt)
         V_end = rates.theta_b
         d_end, _ = slopes(rates, 0.0, V_end, R_end)
     S = 0.0
-    if V > rates.theta_r:
+    if rates.theta_r < V:
         s = 1.0
         if V_end < rates.theta_r:
             s = _crossing(V, V_end, d * dt, d_end * dt, rates.theta_r)
@@ -133,8 +135,10 @@ def _step(rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float) ->
 def _pieces(rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float) -> int:
     """Into how many a step is to be divided: many where V passes the steep part of H, else 1."""
     fall, _ = slopes(rates, 0.0, V, R)
-    steep = V > rates.flat_below * rates.theta_b and V + fall * dt < rates.flat_above * rates.theta_b
-    return 1 + int(_PIECES * rates.h * -fall / V * dt) if mode[1] != STEP and steep else 1
+    steep = (
+        rates.flat_below * rates.theta_b < V and V + fall * dt < rates.flat_above * rates.theta_b
+    )
+    return 1 + int(_PIECES * rates.h * -fall / V * dt) if mode[0] != STEP and steep else 1
 
 
 @compiled
@@ -142,10 +146,10 @@ def flow(
     rates: Rates, mode: tuple[int, ...], V: float, R: float, duration: float, steps_per_bin: int
 ) -> Between:
     """V and R after `duration` bins without input, and the S of that time."""
-    if mode[1] == CLOSED_FORM:
+    if mode[0] == CLOSED_FORM:
         V_end = V * math.exp(-rates.leak * duration)
         return Between(V_end, 0.0, amount(rates, V, V_end))
-    n_steps = int(math.ceil(duration * steps_per_bin))
+    n_steps = math.ceil(duration * steps_per_bin)
     dt = duration / max(n_steps, 1)
     S = 0.0
     for _ in range(n_steps):

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
-from scipy.special import expit
 
 from agents.continuous.neuron import ContinuousGNM
 from agents.continuous.simulate import InputSpikes, Trajectory, checked_weights, report_times
@@ -45,6 +43,8 @@ def _solve(
     neuron: ContinuousGNM, y: NDArray[Any], start: float, stop: float, rtol: float, atol: float
 ) -> NDArray[Any]:
     """V, R and S at `stop`, with no input after `start`."""
+    from scipy.integrate import solve_ivp
+
     levels = {neuron.theta_r, neuron.theta_b} if math.isinf(neuron.h) else {neuron.theta_r}
     while start < stop:
         # The levels that V is above decide the right-hand side until V falls through one.
@@ -62,12 +62,14 @@ def _solve(
             raise RuntimeError(f"solve_ivp failed at t = {solution.t[-1]:g}: {solution.message}")
         y, start = solution.y[:, -1], float(solution.t[-1])
         if solution.status == 1:
-            level = max(level for level, hit in zip(sorted(over), solution.t_events) if hit.size)
-            y[0] = min(y[0], level)
+            hits = zip(sorted(over), solution.t_events, strict=True)
+            y[0] = min(y[0], max(level for level, times in hits if times.size))
     return y
 
 
 def _equations(neuron: ContinuousGNM, over: set[float]) -> Callable[[float, Any], list[float]]:
+    from scipy.special import expit
+
     def H(V: float) -> float:
         if math.isinf(neuron.h):
             return float(neuron.theta_b in over)

@@ -69,7 +69,7 @@ class InputSpikes:
     def from_trial(cls, trial: Trial) -> InputSpikes:
         """The spikes of a trial, each at the beginning of its bin."""
         times = np.repeat(np.arange(trial.n_bins, dtype=np.float64), np.diff(trial.offsets))
-        return cls(times, trial.channels, float(trial.n_bins), trial.n_inputs)
+        return cls(times, trial.channels.astype(np.int64), float(trial.n_bins), trial.n_inputs)
 
 
 def _refuse_first(wrong: NDArray[np.bool_], values: NDArray[np.number], expected: str) -> None:

@@ -1,0 +1,353 @@
+"""The compiled loops of a continuous neuron in bins: each bin's input arrives at its beginning.
+
+They take the place of those in `agents.kernels` that count spikes; the loops that only drive these,
+and the learning step, are the ones from there. One neuron at a time (WIDTH 1). The log of a trial has
+the amount of output in each bin where that of spiking neurons has whether they are above threshold,
+so that in noise the error trace is E(t) = 0 − S(t), as it is target − S over a pattern.
+"""
+
+from __future__ import annotations
+
+import functools
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from agents.continuous.flow import STEPS_PER_BIN, Between, amount, flow
+from agents.kernels import (
+    MOST_SPIKES,
+    Block,
+    Heard,
+    Log,
+    drive_at,
+    learn_trial_template,
+    run_trial_template,
+    train_template,
+)
+from agents.lanes import pack, store, unpack
+from agents.learning.rule import Outcome, Rule, RuleParameters
+from gnm_env.compiled import compiled, specialise
+from gnm_env.sampling import append_piece, append_trial
+from gnm_env.task import World
+
+# Bound by `continuous_kernels`.
+step: Any = None
+run_bins: Any = None
+correction: Any = None
+run_trial: Any = None
+learn_trial: Any = None
+
+
+class Parameters(NamedTuple):
+    """`agents.neurons.gnm.Parameters`, as rates per bin, and what the readout can give."""
+
+    leak: Any
+    eta_gamma: Any
+    beta: Any
+    zeta: Any
+    theta_b: Any
+    theta_r: Any
+    h: Any
+    flat_below: Any
+    flat_above: Any
+    max_output: Any
+    left: Any
+    """e^−(1−η)α, what is left of V after a bin; of use for η = 0 only."""
+
+
+class State(NamedTuple):
+    """At the end of a bin."""
+
+    V: Any
+    R: Any
+
+
+class GradedResponse(NamedTuple):
+    """What the neuron shows in one bin; compare `agents.neurons.neuron.Response`."""
+
+    V: Any
+    """Membrane potential right after the bin's input."""
+    D: Any
+    """What the rest of the bin takes away from it."""
+    R: Any
+    """The neuron's own reset variable at the beginning of the bin."""
+    X: Any
+    """Readout, compared with the threshold: V."""
+    above: Any
+    """Whether the readout is at or above the threshold right after the bin's input."""
+    spike: Any
+    """Whether V rises through ϑ_R in this bin: at its beginning, since only input lifts V."""
+    S: Any
+    """The amount of output, ∫ Θ(V − ϑ_R) V dt over the bin."""
+
+
+@compiled
+def exact_step(
+    p: Parameters, mode: tuple[int, ...], state: State, drive: float
+) -> tuple[State, GradedResponse]:
+    """One bin for η = 0: the input adds `drive` to V at once, then V decays."""
+    V = state.V + drive
+    return _respond(p, state, V, Between(p.left * V, 0.0, amount(p, V, p.left * V)))
+
+
+@compiled
+def numerical_step(
+    p: Parameters, mode: tuple[int, ...], state: State, drive: float
+) -> tuple[State, GradedResponse]:
+    """One bin for η > 0: the input adds `drive` to V at once, then V and R go on together."""
+    V = state.V + drive
+    return _respond(p, state, V, flow(p, mode, V, state.R, 1.0, STEPS_PER_BIN))
+
+
+@compiled
+def _respond(p: Parameters, state: State, V: float, end: Between) -> tuple[State, GradedResponse]:
+    S = min(end.S, p.max_output)
+    above = p.theta_r <= V
+    spike = above and p.theta_r > state.V
+    return State(end.V, end.R), GradedResponse(V, V - end.V, state.R, V, above, spike, S)
+
+
+def run_bins_template(
+    p: Any, mode: Any, state: Any, weights: Block, heard: Heard, start: int, stop: int, log: Log
+) -> tuple[Any, float, float]:
+    """Bins start … stop − 1: the new state, and twice the amount of output (see Log and blame)."""
+    S = 0.0
+    for t in range(start, stop):
+        drive = drive_at(weights, heard.channels, heard.offsets, t, 0.0)
+        state, response = step(p, mode, state, drive)
+        store(log.V, t, response.V)
+        store(log.above, t, response.S)
+        S += response.S
+    return state, S, S
+
+
+@compiled
+def rounded(S: float) -> float:
+    """The number of spikes that the amount S stands for."""
+    return np.floor(S + 0.5)
+
+
+def survive_template(
+    rng: Generator, world: World, cap: int, mode: Any, parameters: Block, weights: Block
+) -> Block:
+    """Bins that each neuron survives on one endless stream from `rng`, at most `cap`.
+
+    A mistake is an amount of more than ½ in a stretch of noise (in the bin that exceeds it), and in
+    an occurrence an amount that rounds to more than is owed (in that bin) or to less (in its last
+    bin). The bin of the mistake is not counted. `parameters` and `weights` have shape
+    (neurons, rows, 1); the result has (neurons, 1, 1).
+    """
+    n_neurons = len(weights)
+    bins = np.zeros((n_neurons, 1, 1))
+    alive = np.ones(n_neurons, np.bool_)
+    states = np.zeros((n_neurons, 2, 1))
+    amounts = np.zeros(n_neurons)
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    noise_left = -1.0
+    heard_bins = 0
+    while heard_bins < cap and alive.any():
+        channels, offsets, n_noise, class_, noise_left = append_piece(
+            rng, world, noise_left, channels, offsets, 0
+        )
+        n_bins = min(n_noise + (world.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
+        owed = world.targets[class_] if class_ >= 0 else 0
+        last_bin = n_noise + world.pattern_bins - 1
+        for k in range(n_neurons):
+            if not alive[k]:
+                continue
+            p = unpack(Parameters, parameters[k], 0.0)
+            state = unpack(State, states[k], 0.0)
+            S = amounts[k]
+            for t in range(n_bins):
+                if t == n_noise:
+                    S = 0.0
+                drive = drive_at(weights[k], channels, offsets, t, 0.0)
+                state, response = step(p, mode, state, drive)
+                S += response.S
+                if t < n_noise:
+                    alive[k] = S <= 0.5
+                else:
+                    alive[k] = rounded(S) <= owed and (t < last_bin or rounded(S) == owed)
+                if not alive[k]:
+                    break
+                bins[k, 0, 0] += 1.0
+            pack(states[k], state)
+            # The next piece goes on in the same noise, unless a pattern has ended this one.
+            amounts[k] = S if class_ < 0 else 0.0
+        heard_bins += n_bins
+    return bins
+
+
+def answer_template(
+    rng: Generator, world: World, trials: int, mode: Any, parameters: Block, weights: Block
+) -> tuple[NDArray[np.int64], Block, Block, int]:
+    """Rounded responses of each neuron to `trials` trials; as `agents.kernels.answer_template`."""
+    n_neurons = len(weights)
+    table = np.zeros((n_neurons, 1, world.n_classes, MOST_SPIKES + 1), np.int64)
+    false_alarms = np.zeros((n_neurons, 1, 1))
+    wrong = np.zeros((n_neurons, 1, 1))
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    onsets, classes = np.empty(8, np.int64), np.empty(8, np.int64)
+    for _ in range(trials):
+        channels, offsets, onsets, classes, n_bins, n_occurrences, label = append_trial(
+            rng, world, channels, offsets, onsets, classes, 0, 0
+        )
+        heard = Heard(
+            channels,
+            offsets[: n_bins + 1],
+            onsets[:n_occurrences],
+            world.targets[classes[:n_occurrences]],
+            world.pattern_bins,
+        )
+        log = Log(np.empty((n_bins, 1)), np.empty((n_bins, 1)), np.empty((n_occurrences, 1)))
+        for k in range(n_neurons):
+            p = unpack(Parameters, parameters[k], 0.0)
+            outcome, _ = run_trial(p, mode, weights[k], heard, log)
+            false_alarms[k, 0, 0] += in_noise(heard, log)
+            if rounded(outcome.emitted) != label:
+                wrong[k, 0, 0] += 1.0
+            for j in range(n_occurrences):
+                given = min(int(rounded(log.counts[j, 0])), MOST_SPIKES)
+                table[k, 0, classes[j], given] += 1
+    return table, false_alarms, wrong, trials * world.background_bins
+
+
+@compiled
+def in_noise(heard: Heard, log: Log) -> float:
+    """Σ over the stretches of noise of the rounded amount in each."""
+    total = 0.0
+    t = 0
+    for k in range(len(heard.onsets) + 1):
+        last = k == len(heard.onsets)
+        stop = len(heard.offsets) - 1 if last else heard.onsets[k]
+        total += rounded(log.above[t:stop].sum())
+        if not last:
+            t = stop + heard.pattern_bins
+    return total
+
+
+def hear_template(
+    mode: Any,
+    parameters: Block,
+    weights: Block,
+    state: Block,
+    observation: NDArray[np.int8],
+    t: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    V: Block,
+    above: Block,
+    spikes: NDArray[np.int64],
+) -> float:
+    """One bin of the standard loop, as `agents.kernels.hear_template`; returns the amount S."""
+    n_events = offsets[t]
+    if t == len(V) or n_events + len(observation) > len(channels):
+        return -1.0
+    for i in range(len(observation)):
+        if observation[i] != 0:
+            channels[n_events] = i
+            n_events += 1
+    offsets[t + 1] = n_events
+    p = unpack(Parameters, parameters, 0.0)
+    drive = drive_at(weights, channels, offsets, t, 0.0)
+    new_state, response = step(p, mode, unpack(State, state, 0.0), drive)
+    pack(state, new_state)
+    V[t, 0] = response.V
+    above[t, 0] = response.S
+    return response.S
+
+
+def study_template(
+    rule_mode: Any,
+    rule_parameters: Block,
+    sign: float,
+    heard: Heard,
+    label: int,
+    log: Log,
+    spikes: NDArray[np.int64],
+    weights: Block,
+    previous: Block,
+) -> bool:
+    """The learning step of the standard loop, as `agents.kernels.study_template`.
+
+    The amounts are summed in the order of `run_trial`, so that the sums have the same bits.
+    """
+    c = sign
+    if np.isnan(sign):
+        noise, patterns = 0.0, 0.0
+        blamed = False
+        t = 0
+        for k in range(len(heard.onsets) + 1):
+            last = k == len(heard.onsets)
+            stop = len(heard.offsets) - 1 if last else heard.onsets[k]
+            S = 0.0
+            for s in range(t, stop):
+                S += log.above[s, 0]
+            noise += S
+            if last:
+                break
+            t = stop + heard.pattern_bins
+            S = 0.0
+            for s in range(stop, t):
+                S += log.above[s, 0]
+            patterns += S
+            log.counts[k, 0] = S
+            blamed = blamed or heard.owed[k] != S
+        c = correction(Outcome(noise + patterns, float(label), blamed or noise > 0.0))
+    if c == 0.0:
+        return True
+    p = unpack(RuleParameters, rule_parameters, 0.0)
+    eligibility = np.empty((len(weights), 1))
+    return learn_trial(p, rule_mode, c, heard, log, eligibility, weights, previous)
+
+
+def foresee_template(
+    mode: Any, parameters: Block, weights: Block, states: Block, observations: NDArray[np.int8]
+) -> NDArray[np.float64]:
+    """Amounts for one bin of n independent streams; `states` (n, 2, 1) is moved on in place."""
+    p = unpack(Parameters, parameters, 0.0)
+    amounts = np.empty((len(observations), 1))
+    for k in range(len(observations)):
+        drive = 0.0
+        for i in range(observations.shape[1]):
+            if observations[k, i] != 0:
+                drive += weights[i, 0]
+        state, response = step(p, mode, unpack(State, states[k], 0.0), drive)
+        pack(states[k], state)
+        amounts[k, 0] = response.S
+    return amounts
+
+
+@functools.cache
+def continuous_kernels(exact: bool, rule: type[Rule]) -> Any:
+    """The compiled loops for η = 0 (exact) or not, and one rule; names as in `agents.kernels`."""
+    name, step = STEPS[exact]
+    of_neuron = {"WIDTH": 1, "Parameters": Parameters, "State": State, "step": step}
+    of_rule = {
+        "USES_ERROR": rule.uses_error,
+        "DOUBLE_TRACE": False,
+        "correction": rule.correction,
+        "teaching_signal": rule.teaching_signal,
+        "weight_change": rule.weight_change,
+    }
+    together = f"{name}_{rule.name}"
+    bins = specialise(run_bins_template, name, step=step)
+    trial = specialise(run_trial_template, name, run_bins=bins, **of_neuron)
+    learn = specialise(learn_trial_template, together, WIDTH=1, **of_rule)
+    # The log holds amounts whatever the rule: it needs the room that rules with an error ask for.
+    all_ = {**of_neuron, **of_rule, "USES_ERROR": True, "run_trial": trial, "learn_trial": learn}
+    return SimpleNamespace(
+        train=specialise(train_template, together, **all_),
+        study=specialise(study_template, together, correction=rule.correction, learn_trial=learn),
+        answer=specialise(answer_template, name, run_trial=trial),
+        survive=specialise(survive_template, name, step=step),
+        hear=specialise(hear_template, name, step=step),
+        foresee=specialise(foresee_template, name, step=step),
+    )
+
+
+STEPS = {True: ("continuous_exact", exact_step), False: ("continuous_numerical", numerical_step)}
+"""The step for η = 0 and for other η, each with its name."""
