@@ -1,0 +1,48 @@
+"""Start a sweep ten times and kill it each time, at a random moment.
+
+Each start is a fork of this process, which has imported everything: it starts fast.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+
+import dask.array  # noqa: F401  (what xarray imports for the first store that a process makes)
+
+from store import summarise
+from sweep import sweep
+from tests.scripts.toys import toy
+from workers import threads
+
+
+def start(folder: Path) -> int:
+    """A sweep in a child process; returns its process number."""
+    child = os.fork()
+    if child == 0:
+        with threads(2) as executor:
+            sweep(toy(seeds=12, pause=0.05), folder, executor)
+        os._exit(0)
+    return child
+
+
+def main(folder: Path) -> None:
+    """Print how each of the ten ended and how many blocks were there then."""
+    moments = random.Random(1)
+    ends, done = [], []
+    for _ in range(10):
+        child = start(folder)
+        time.sleep(moments.uniform(0.02, 0.3))
+        os.kill(child, signal.SIGKILL)
+        ends.append(os.waitpid(child, 0)[1])
+        done.append(summarise(folder).done if folder.exists() else 0)
+    print(json.dumps({"ends": ends, "done": done}))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+from experiments.design import Block
+from store import DATA, read, summarise
+from sweep import pattern_seeds, sweep
+from tests.scripts.toys import toy, work
+from workers import threads
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(folder: Path, **settings: Any) -> xr.Dataset:
+    with threads(2) as executor:
+        sweep(toy(**settings), folder, executor)
+    return read(folder)
+
+
+def script(name: str, *arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / name), *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, cwd=cwd,
+    )  # fmt: skip
+
+
+def test_a_finished_sweep_computes_nothing_again(tmp_path: Path) -> None:
+    first = run(tmp_path / "toy")
+
+    def never(block: Block) -> dict[str, Any]:
+        raise AssertionError(f"computed block {block.number} again")
+
+    xr.testing.assert_identical(run(tmp_path / "toy", compute=never), first)
+
+
+def helper(name: str, *arguments: object) -> dict[str, Any]:
+    """Run one of the programs beside this file; its last line is what it has to tell."""
+    ended = subprocess.run(
+        [sys.executable, "-m", f"tests.scripts.{name}", *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "scripts"), str(ROOT)])},
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    told: dict[str, Any] = json.loads(ended.stdout.splitlines()[-1])
+    return told
+
+
+def test_a_sweep_killed_at_ten_random_moments_ends_with_the_same_values(tmp_path: Path) -> None:
+    folder = tmp_path / "toy"
+    told = helper("killed_sweep", folder)
+    assert told["ends"] == [signal.SIGKILL] * 10
+    assert told["done"] == sorted(told["done"])
+    assert 0 < told["done"][-1] < 72, "kills should meet a sweep at work"
+
+    survivor = run(folder, seeds=12, pause=0.05)
+
+    xr.testing.assert_identical(survivor, run(tmp_path / "whole", seeds=12, pause=0.05))
+    assert summarise(folder).done == summarise(folder).blocks == 72
+    assert not list((folder / DATA).rglob("*.partial"))
+
+
+def test_a_block_that_fails_costs_no_finished_block(tmp_path: Path) -> None:
+    def fails_late(block: Block) -> dict[str, Any]:
+        if block.number == 9:
+            time.sleep(0.2)
+            raise ValueError("block 9 has no answer")
+        return work(block)
+
+    with pytest.raises(ValueError, match="block 9 has no answer"):
+        run(tmp_path / "toy", compute=fails_late)
+    assert 0 < summarise(tmp_path / "toy").done < 18
+    run(tmp_path / "toy")
+
+
+def test_a_full_disk_is_one_line_with_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(tmp_path / "whole")
+    put, calls = sys.modules["zarr.storage._local"]._put, []
+
+    def nearly_full(path: Path, *arguments: Any, **options: Any) -> Any:
+        calls.append(path)
+        if "/c/" in str(path) and "survived" in str(path) and len(calls) > 20:
+            raise OSError(28, "No space left on device")
+        return put(path, *arguments, **options)
+
+    monkeypatch.setattr("zarr.storage._local._put", nearly_full)
+    kept = r"No space left on device while writing .*toy; \d+ of 18 blocks are kept"
+    with pytest.raises(OSError, match=kept):
+        run(tmp_path / "toy")
+    monkeypatch.undo()
+    xr.testing.assert_identical(run(tmp_path / "toy"), read(tmp_path / "whole"))
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds"), [("3", (0, 1, 2)), ("3,5,8", (3, 5, 8)), ("4-6", (4, 5, 6))]
+)
+def test_seeds_are_a_number_a_list_or_a_range(text: str, seeds: tuple[int, ...]) -> None:
+    assert pattern_seeds(text) == seeds
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["F99"], "there is no experiment 'F99': choose one of F1, F3"),
+        (["F1", "--store", "/proc/nowhere/F1"], "/proc/nowhere"),
+        (["F1", "--threads", "0"], "--threads must be at least 1, got 0"),
+    ],
+)
+def test_bad_input_ends_with_one_line_and_code_2(
+    tmp_path: Path, arguments: list[str], complaint: str
+) -> None:
+    ended = script("sweep.py", *arguments, cwd=tmp_path)
+
+    assert ended.returncode == 2
+    assert complaint in ended.stderr
+    assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+
+
+def test_a_script_ends_with_one_json_object_and_a_line_of_progress(tmp_path: Path) -> None:
+    ended = script("sweep.py", "F1", "--json", cwd=tmp_path)
+
+    assert ended.returncode == 0, ended.stderr
+    summary = json.loads(ended.stdout.splitlines()[-1])
+    assert (summary["experiment"], summary["done"], summary["blocks"]) == ("F1", 2, 2)
+    assert ended.stderr == "F1: 2/2 blocks, 0 s\n" or ended.stderr.startswith("F1: 2/2 blocks, ")
+    assert read(tmp_path / "results" / "quick" / "F1").sizes["bin"] == 200
+
+
+def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(tmp_path: Path) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    started = time.monotonic()
+    ended = script("sweep.py", "F1", "--scheduler", address, cwd=tmp_path)
+
+    assert time.monotonic() - started < 10
+    assert ended.returncode == 2
+    assert ended.stderr.startswith(f"sweep: no Dask scheduler answers at {address}")
+    assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+
+
+@pytest.mark.slow
+def test_a_dask_worker_that_dies_costs_its_block_only(tmp_path: Path) -> None:
+    told = helper("dying_worker", tmp_path / "toy")
+
+    assert told["killed"] in told["workers"]
+    assert told["killed"] not in told["workers_at_the_end"]
+    assert told["computed"] - 18 in (0, 1), "only the block at which the worker died is done twice"
+    xr.testing.assert_identical(read(tmp_path / "toy"), run(tmp_path / "whole", pause=0.2))
