@@ -26,7 +26,7 @@ def start(folder: Path) -> int:
     child = os.fork()
     if child == 0:
         with threads(2) as executor:
-            sweep(toy(seeds=12, pause=0.05), folder, executor)
+            sweep(toy(seeds=8, pause=0.04), folder, executor)
         os._exit(0)
     return child
 
@@ -37,7 +37,7 @@ def main(folder: Path) -> None:
     ends, done = [], []
     for _ in range(10):
         child = start(folder)
-        time.sleep(moments.uniform(0.02, 0.3))
+        time.sleep(moments.uniform(0.02, 0.2))
         os.kill(child, signal.SIGKILL)
         ends.append(os.waitpid(child, 0)[1])
         done.append(summarise(folder).done if folder.exists() else 0)

@@ -17,7 +17,7 @@ from experiments.design import Block
 from store import DATA, read, summarise
 from sweep import pattern_seeds, sweep
 from tests.scripts.toys import toy, work
-from workers import threads
+from workers import cluster, threads
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -61,12 +61,12 @@ def test_a_sweep_killed_at_ten_random_moments_ends_with_the_same_values(tmp_path
     told = helper("killed_sweep", folder)
     assert told["ends"] == [signal.SIGKILL] * 10
     assert told["done"] == sorted(told["done"])
-    assert 0 < told["done"][-1] < 72, "kills should meet a sweep at work"
+    assert 0 < told["done"][-1] < 48, "kills should meet a sweep at work"
 
-    survivor = run(folder, seeds=12, pause=0.05)
+    survivor = run(folder, seeds=8, pause=0.04)
 
-    xr.testing.assert_identical(survivor, run(tmp_path / "whole", seeds=12, pause=0.05))
-    assert summarise(folder).done == summarise(folder).blocks == 72
+    xr.testing.assert_identical(survivor, run(tmp_path / "whole", seeds=8, pause=0.04))
+    assert summarise(folder).done == summarise(folder).blocks == 48
     assert not list((folder / DATA).rglob("*.partial"))
 
 
@@ -138,16 +138,36 @@ def test_a_script_ends_with_one_json_object_and_a_line_of_progress(tmp_path: Pat
     assert read(tmp_path / "results" / "quick" / "F1").sizes["bin"] == 200
 
 
-def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(tmp_path: Path) -> None:
+@pytest.fixture
+def nowhere() -> str:
+    """The address of a scheduler that is not there."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+        return f"tcp://127.0.0.1:{free.getsockname()[1]}"
+
+
+def test_a_scheduler_that_is_not_there_is_refused(
+    nowhere: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workers.CONNECTION_SECONDS", 0.3)
+
+    with (
+        pytest.raises(ValueError, match=f"no Dask scheduler answers at {nowhere} .*: start one"),
+        cluster(nowhere),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(
+    tmp_path: Path, nowhere: str
+) -> None:
     started = time.monotonic()
-    ended = script("sweep.py", "F1", "--scheduler", address, cwd=tmp_path)
+    ended = script("sweep.py", "F1", "--scheduler", nowhere, cwd=tmp_path)
 
     assert time.monotonic() - started < 10
     assert ended.returncode == 2
-    assert ended.stderr.startswith(f"sweep: no Dask scheduler answers at {address}")
+    assert ended.stderr.startswith(f"sweep: no Dask scheduler answers at {nowhere}")
     assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
 
 
