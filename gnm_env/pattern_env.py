@@ -11,6 +11,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from gnm_env.generators import Generators
 from gnm_env.task import Patterns, Task, world
 
 
@@ -38,6 +39,7 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
         self.potential = float("nan")
         """The agent's membrane potential in units of its threshold, for pictures only: an agent may
         set it before `step`."""
+        self._held: Generators | None = None
         self._scroll: Any = None
         if render_mode is not None:
             from gnm_env.rendering import Scroll
@@ -47,6 +49,12 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
     def render(self) -> NDArray[np.uint8] | None:
         """The last bins as a picture, (height, width, 3) uint8; None without a render mode."""
         return None if self._scroll is None else self._scroll.frame()
+
+    def _generators(self) -> Generators:
+        """`np_random` for compiled code."""
+        if self._held is None or self._held.rngs[0] is not self.np_random:
+            self._held = Generators([self.np_random])
+        return self._held
 
     @staticmethod
     def _require_reset() -> None:

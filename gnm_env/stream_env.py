@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.compiled import compiled
 from gnm_env.pattern_env import PatternEnv, spike_from
 from gnm_env.sampling import append_piece, new_buffers
-from gnm_env.task import Patterns, Task, dense
+from gnm_env.task import Patterns, Task, World, dense
 
 MAX_EPISODE_BINS = 10_000
 """Cap of the noisy performance, in bins: `max_episode_steps` of the registered environment."""
@@ -92,8 +93,8 @@ class PatternStreamEnv(PatternEnv):
         self._next_piece()
 
     def _next_piece(self) -> None:
-        channels, offsets, n_noise, self._class, self._noise_left = append_piece(
-            self.np_random, self._world, self._noise_left, *self._buffers, 0
+        channels, offsets, n_noise, self._class, self._noise_left = _next_piece(
+            self._generators().held, self._world, self._noise_left, *self._buffers
         )
         self._buffers = channels, offsets
         self._pattern_bins = self.task.pattern_bins if self._class >= 0 else 0
@@ -137,3 +138,14 @@ class PatternStreamEnv(PatternEnv):
         """Show the picture the bin shown last and the answer to it."""
         shown = self._raster[-1 - len(self._ahead)]
         self._scroll.push(shown, -1 if self._in_noise() else self._class, spike, self.potential)
+
+
+@compiled
+def _next_piece(
+    held: Any,
+    world: World,
+    noise_left: float,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+) -> tuple[NDArray[np.int32], NDArray[np.int64], int, int, float]:
+    return append_piece(held[0], world, noise_left, channels, offsets, 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gnm_env.checks import whole
 from gnm_env.compiled import compiled
+from gnm_env.generators import Generators
 from gnm_env.sampling import append_trial
 from gnm_env.task import Patterns, Task, World, dense, sparse, world
 
@@ -41,7 +43,7 @@ class Trial:
 
     def __post_init__(self) -> None:
         for array in (self.channels, self.offsets, self.onsets, self.classes, self.targets):
-            array.flags.writeable = False
+            array.setflags(write=False)
 
     @property
     def n_bins(self) -> int:
@@ -164,8 +166,22 @@ def draw_trial(task: Task, patterns: Patterns, rng: Generator) -> Trial:
     bin chosen uniformly; T = background_bins + M·Σ k_c. The environments draw the same trials from
     the same generator.
     """
-    channels, offsets, onsets, classes, targets = _draw(rng, world(task, patterns))
+    return _trial(_draw(rng, world(task, patterns)), task)
+
+
+def draw_next(task: Task, numbers: World, generators: Generators) -> Trial:
+    """`draw_trial` from the first of `generators`, at less cost."""
+    return _trial(_draw_held(generators.held, numbers), task)
+
+
+def _trial(arrays: tuple[NDArray[Any], ...], task: Task) -> Trial:
+    channels, offsets, onsets, classes, targets = arrays
     return Trial(channels, offsets, onsets, classes, targets, task.n_inputs, task.pattern_bins)
+
+
+@compiled
+def _draw_held(held: Any, world: World) -> tuple[NDArray[Any], ...]:
+    return _draw(held[0], world)
 
 
 @compiled

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gnm_env.checks import choice, real
 from gnm_env.pattern_env import PatternEnv, spike_from
 from gnm_env.task import Patterns, Task, dense
-from gnm_env.trial import Trial, draw_trial
+from gnm_env.trial import Trial, draw_next
 
 FEEDBACK = ("cost", "sign", "dense")
 OUTPUT = ("spikes", "graded")
@@ -99,7 +99,7 @@ class PatternTrialEnv(PatternEnv):
         super().reset(seed=seed)
         trial = self._refuse_options(options, ("trial",)).get("trial")
         if trial is None:
-            trial = draw_trial(self.task, self.patterns, self.np_random)
+            trial = draw_next(self.task, self._world, self._generators())
         self._begin(trial)
         return self._ahead.pop(), {}
 
