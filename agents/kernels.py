@@ -20,7 +20,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from agents.lanes import any_lane, full, load, negated, pack, repeated, store, unpack, where
+from agents.lanes import any_lane, full, load, pack, repeated, store, unpack, where
 from agents.learning.momentum import apply_change
 from agents.learning.rule import Outcome, Rule, RuleParameters
 from agents.neurons.neuron import Neuron
@@ -38,6 +38,7 @@ MOST_SPIKES = 10
 
 # Bound by `kernels`; the values here only say what belongs there.
 WIDTH = 1
+LEARN_WIDTH = 8
 Parameters: Any = None
 State: Any = None
 step: Any = None
@@ -48,6 +49,7 @@ USES_ERROR = False
 DOUBLE_TRACE = False
 run_bins: Any = None
 run_trial: Any = None
+sum_eligibility: Any = None
 learn_trial: Any = None
 
 
@@ -128,22 +130,43 @@ def run_trial_template(p: Any, mode: Any, weights: Block, heard: Heard, log: Log
 
 
 def learn_trial_template(
-    p: RuleParameters,
+    rule_parameters: Block,
     mode: Any,
-    c: Any,
+    corrections: Block,
     heard: Heard,
     log: Log,
     eligibility: Block,
     weights: Block,
     previous: Block,
-) -> Any:
-    """The learning step after a trial, in the lanes whose correction `c` is not 0.
+    sound: Block,
+) -> None:
+    """The learning step after a trial, in the lanes whose correction is not 0.
 
-    ε_i = Σ_t x_i(t) y(t) with the presynaptic trace x_i and the rule's teaching signal y is summed
-    backward: g(t) = Σ_{s>=t} slow^(s−t) y(s) is what a spike at t adds to its channel's ε.
-    Returns the lanes in which the step was taken: those in which no weight overflowed.
+    Works through the block in pieces of LEARN_WIDTH lanes and leaves out those with nothing to
+    learn. Sets `sound` (1, WIDTH) to 0 where a weight would have overflowed, else to 1.
     """
-    zero = full(0.0, WIDTH)
+    for first in range(0, WIDTH, LEARN_WIDTH):
+        part = slice(first, first + LEARN_WIDTH)
+        zero = full(0.0, LEARN_WIDTH)
+        c = load(corrections[:, part], 0, zero)
+        if any_lane(c != 0.0):
+            p = unpack(RuleParameters, rule_parameters[:, part], zero)
+            part_log = Log(log.V[:, part], log.above[:, part], log.counts[:, part])
+            part_eligibility = eligibility[:, part]
+            sum_eligibility(p, mode, heard, part_log, part_eligibility)
+            weight_change(p, mode, c, part_eligibility)
+            taken = apply_change(p, c != 0.0, part_eligibility, weights[:, part], previous[:, part])
+            store(sound[:, part], 0, where(taken, 1.0, zero))
+
+
+def sum_eligibility_template(
+    p: RuleParameters, mode: Any, heard: Heard, log: Log, eligibility: Block
+) -> None:
+    """ε_i = Σ_t x_i(t) y(t), with the presynaptic trace x_i and the rule's teaching signal y.
+
+    Summed backward: g(t) = Σ_{s>=t} slow^(s−t) y(s) is what a spike at t adds to its channel's ε.
+    """
+    zero = full(0.0, LEARN_WIDTH)
     for i in range(len(eligibility)):
         store(eligibility, i, zero)
     slow = zero
@@ -167,8 +190,6 @@ def learn_trial_template(
         for e in range(heard.offsets[t], heard.offsets[t + 1]):
             channel = heard.channels[e]
             store(eligibility, channel, load(eligibility, channel, zero) + gain)
-    weight_change(p, mode, c, eligibility)
-    return apply_change(p, c != 0.0, eligibility, weights, previous)
 
 
 def train_template(
@@ -195,6 +216,8 @@ def train_template(
     wrong = np.zeros((n_blocks, 1, WIDTH))
     absolute = np.zeros((n_blocks, 1, WIDTH))
     eligibility = np.empty((world.n_inputs, WIDTH))
+    corrections = np.empty((1, WIDTH))
+    sound = np.empty((1, WIDTH))
     channels, offsets = np.empty(4096, np.int32), np.zeros(8192, np.int64)
     onsets, classes = np.empty(256, np.int64), np.empty(256, np.int64)
     bin_of = np.zeros(BATCH_BINS + 2, np.int64)  # first bin and first occurrence of each trial
@@ -222,7 +245,6 @@ def train_template(
         log = Log(V, above, counts)
         for block in range(n_blocks):
             p = unpack(Parameters, parameters[block], zero)
-            rule_p = unpack(RuleParameters, rule_parameters[block], zero)
             for k in range(drawn):
                 heard = Heard(
                     channels,
@@ -241,22 +263,23 @@ def train_template(
                 )
                 ended = load(overflow[block], 0, zero)
                 c = where(ended < 0.0, correction(outcome), zero)
+                store(corrections, 0, c)
                 if any_lane(c != 0.0):
-                    taken = learn_trial(
-                        rule_p,
+                    learn_trial(
+                        rule_parameters[block],
                         rule_mode,
-                        c,
+                        corrections,
                         heard,
                         log,
                         eligibility,
                         weights[block],
                         previous[block],
+                        sound,
                     )
-                    failed = (c != 0.0) & negated(taken)
+                    failed = (c != 0.0) & (load(sound, 0, zero) == 0.0)
                     if any_lane(failed):
-                        store(
-                            overflow[block], 0, where(failed, float(first_trial + done + k), ended)
-                        )
+                        trial = float(first_trial + done + k)
+                        store(overflow[block], 0, where(failed, trial, ended))
         done += drawn
     return wrong, absolute
 
@@ -424,8 +447,6 @@ def study_template(
     `sign` is the feedback where only its sign is known, NaN where label and occurrences are.
     Returns False if the step was called for but would have made a weight overflow.
     """
-    zero = full(0.0, WIDTH)
-    p = unpack(RuleParameters, rule_parameters, zero)
     if np.isnan(sign):
         emitted = 0
         blame = 0.0
@@ -451,7 +472,12 @@ def study_template(
     if c == 0.0:
         return True
     eligibility = np.empty((len(weights), WIDTH))
-    return learn_trial(p, rule_mode, c, heard, log, eligibility, weights, previous)
+    corrections = np.full((1, WIDTH), c)
+    sound = np.empty((1, WIDTH))
+    learn_trial(
+        rule_parameters, rule_mode, corrections, heard, log, eligibility, weights, previous, sound
+    )
+    return sound[0, 0] > 0.0
 
 
 def foresee_template(
@@ -477,9 +503,7 @@ def kernels(neuron: Neuron, rule: Rule, width: int = 1) -> Any:
 
     Compiled at their first call and kept on disk.
     """
-    return _kernels(
-        *neuron.step(), type(neuron), type(rule), rule.trace(neuron).double, width
-    )
+    return _kernels(*neuron.step(), type(neuron), type(rule), rule.trace(neuron).double, width)
 
 
 @functools.cache
@@ -489,6 +513,7 @@ def _kernels(
     of_neuron = _neuron_bindings(step, neuron, width)
     of_rule = {
         "WIDTH": width,
+        "LEARN_WIDTH": min(width, LEARN_WIDTH),
         "USES_ERROR": rule.uses_error,
         "DOUBLE_TRACE": double,
         "correction": rule.correction,
@@ -499,7 +524,8 @@ def _kernels(
     together = f"{name}_{rule.name}_{'double' if double else 'single'}_{width}"
     bins = specialise(run_bins_template, together, **of_neuron, USES_ERROR=rule.uses_error)
     trial = specialise(run_trial_template, together, **of_neuron, run_bins=bins)
-    learn = specialise(learn_trial_template, together, **of_rule)
+    eligibility = specialise(sum_eligibility_template, together, **of_rule)
+    learn = specialise(learn_trial_template, together, **of_rule, sum_eligibility=eligibility)
     all_ = {**of_neuron, **of_rule, "run_trial": trial, "learn_trial": learn}
     return SimpleNamespace(
         train=specialise(train_template, together, **all_),

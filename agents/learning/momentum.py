@@ -13,6 +13,13 @@ from gnm_env.compiled import compiled
 
 
 @compiled
+def clipped(p: RuleParameters, weight: Any) -> Any:
+    """The weight, or the bound that it has passed."""
+    weight = where(weight > p.lowest, weight, p.lowest)
+    return where(weight < p.highest, weight, p.highest)
+
+
+@compiled
 def apply_change(
     p: RuleParameters,
     learns: Any,
@@ -22,23 +29,19 @@ def apply_change(
 ) -> Any:
     """Δ_i <- Δ_i + μ·Δ_i(previous step); w_i <- clip(w_i + Δ_i), in the lanes that `learns` names.
 
-    `change`, `weights` and `previous` have shape (N, p.momentum); `previous` holds the Δ of the previous
-    learning step, momentum included and unclipped. A step that would make a weight overflow is not
-    taken. Returns the lanes in which it was taken.
+    The three arrays have one row per input; `previous` holds the Δ of the previous learning step,
+    momentum included and unclipped. A weight that would overflow keeps its last finite value.
+    Returns the lanes in which none would have.
     """
-    probe = load(change, 0, p.momentum) * 0.0
+    zero = p.momentum * 0.0
+    probe = zero
     for i in range(len(change)):
-        delta = load(change, i, p.momentum) + p.momentum * load(previous, i, p.momentum)
-        store(change, i, delta)
-        weight = load(weights, i, p.momentum) + delta
-        weight = where(weight < p.lowest, p.lowest, where(weight > p.highest, p.highest, weight))
-        probe = probe + (weight - weight)  # 0, or NaN once a weight is infinite or NaN
-    taken = learns & (probe == 0.0)
-    for i in range(len(change)):
-        delta = load(change, i, p.momentum)
-        old = load(weights, i, p.momentum)
-        weight = old + delta
-        weight = where(weight < p.lowest, p.lowest, where(weight > p.highest, p.highest, weight))
-        store(weights, i, where(taken, weight, old))
-        store(previous, i, where(taken, delta, load(previous, i, p.momentum)))
-    return taken
+        old, before = load(weights, i, zero), load(previous, i, zero)
+        delta = load(change, i, zero) + p.momentum * before
+        new = old + delta
+        overflow = new * 0.0  # 0 for finite numbers, else NaN
+        probe = probe + overflow
+        taken = learns & (overflow == 0.0)
+        store(weights, i, where(taken, clipped(p, new), old))
+        store(previous, i, where(taken, delta, before))
+    return probe == 0.0
