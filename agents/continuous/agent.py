@@ -57,7 +57,7 @@ class ContinuousAgent(NeuronAgent):
 
     def _prepare(self) -> None:
         super()._prepare()
-        self._kernels = continuous_kernels(self.neuron.eta == 0.0, type(self.rule))
+        self._kernels = continuous_kernels(self.neuron, self.rule)
 
     def predict(
         self,

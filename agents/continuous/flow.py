@@ -2,9 +2,9 @@
 
 Between input spikes V falls towards 0 without ever turning round, so that it crosses the readout
 threshold at most once, and downwards. For η = 0 V and S are known in closed form. For η > 0 the
-equations are solved by the classical Runge–Kutta method of order 4 in equal steps, divided where the
-Hill function is steep; within a step V is the cubic that has V and dV/dt right at both ends (order 4
-as well), which gives the area under V and the time of a crossing.
+equations are solved by the classical Runge–Kutta method of order 4 in equal steps, divided where
+the Hill function is steep; within a step V is the cubic that has V and dV/dt right at both ends
+(order 4 as well), which gives the area under V and the time of a crossing.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The compiled loops of a continuous neuron in bins: each bin's input arrives at its beginning.
 
 They take the place of those in `agents.kernels` that count spikes; the loops that only drive these,
-and the learning step, are the ones from there. One neuron at a time (WIDTH 1). The log of a trial has
-the amount of output in each bin where that of spiking neurons has whether they are above threshold,
-so that in noise the error trace is E(t) = 0 − S(t), as it is target − S over a pattern.
+and the learning step, are the ones from there. One neuron at a time (WIDTH 1). The log of a trial
+has the amount of output in each bin where that of spiking neurons has whether they are above
+threshold, so that in noise the error trace is E(t) = 0 − S(t), as over a pattern it is target − S.
 """
 
 from __future__ import annotations
@@ -23,22 +23,23 @@ from agents.kernels import (
     Heard,
     Log,
     drive_at,
+    kernels,
     learn_trial_template,
     run_trial_template,
+    sum_eligibility_template,
     train_template,
 )
 from agents.lanes import pack, store, unpack
-from agents.learning.rule import Outcome, Rule, RuleParameters
+from agents.learning.rule import Rule
+from agents.neurons.neuron import Neuron
 from gnm_env.compiled import compiled, specialise
 from gnm_env.sampling import append_piece, append_trial
 from gnm_env.task import World
 
-# Bound by `continuous_kernels`.
+# Bound by `_continuous_kernels`.
 step: Any = None
 run_bins: Any = None
-correction: Any = None
 run_trial: Any = None
-learn_trial: Any = None
 
 
 class Parameters(NamedTuple):
@@ -260,50 +261,6 @@ def hear_template(
     return response.S
 
 
-def study_template(
-    rule_mode: Any,
-    rule_parameters: Block,
-    sign: float,
-    heard: Heard,
-    label: int,
-    log: Log,
-    spikes: NDArray[np.int64],
-    weights: Block,
-    previous: Block,
-) -> bool:
-    """The learning step of the standard loop, as `agents.kernels.study_template`.
-
-    The amounts are summed in the order of `run_trial`, so that the sums have the same bits.
-    """
-    c = sign
-    if np.isnan(sign):
-        noise, patterns = 0.0, 0.0
-        blamed = False
-        t = 0
-        for k in range(len(heard.onsets) + 1):
-            last = k == len(heard.onsets)
-            stop = len(heard.offsets) - 1 if last else heard.onsets[k]
-            S = 0.0
-            for s in range(t, stop):
-                S += log.above[s, 0]
-            noise += S
-            if last:
-                break
-            t = stop + heard.pattern_bins
-            S = 0.0
-            for s in range(stop, t):
-                S += log.above[s, 0]
-            patterns += S
-            log.counts[k, 0] = S
-            blamed = blamed or heard.owed[k] != S
-        c = correction(Outcome(noise + patterns, float(label), blamed or noise > 0.0))
-    if c == 0.0:
-        return True
-    p = unpack(RuleParameters, rule_parameters, 0.0)
-    eligibility = np.empty((len(weights), 1))
-    return learn_trial(p, rule_mode, c, heard, log, eligibility, weights, previous)
-
-
 def foresee_template(
     mode: Any, parameters: Block, weights: Block, states: Block, observations: NDArray[np.int8]
 ) -> NDArray[np.float64]:
@@ -321,12 +278,21 @@ def foresee_template(
     return amounts
 
 
+STEPS = {True: ("continuous_exact", exact_step), False: ("continuous_numerical", numerical_step)}
+"""The step for η = 0 and for other η, each with its name."""
+
+
+def continuous_kernels(neuron: Neuron, rule: Rule) -> Any:
+    """The compiled loops for a continuous neuron and a rule; names as in `agents.kernels`."""
+    return _continuous_kernels(*neuron.step(), type(rule), kernels(neuron, rule).study)
+
+
 @functools.cache
-def continuous_kernels(exact: bool, rule: type[Rule]) -> Any:
-    """The compiled loops for η = 0 (exact) or not, and one rule; names as in `agents.kernels`."""
-    name, step = STEPS[exact]
+def _continuous_kernels(name: str, step: Any, rule: type[Rule], study: Any) -> Any:
     of_neuron = {"WIDTH": 1, "Parameters": Parameters, "State": State, "step": step}
     of_rule = {
+        "WIDTH": 1,
+        "LEARN_WIDTH": 1,
         "USES_ERROR": rule.uses_error,
         "DOUBLE_TRACE": False,
         "correction": rule.correction,
@@ -336,18 +302,25 @@ def continuous_kernels(exact: bool, rule: type[Rule]) -> Any:
     together = f"{name}_{rule.name}"
     bins = specialise(run_bins_template, name, step=step)
     trial = specialise(run_trial_template, name, run_bins=bins, **of_neuron)
-    learn = specialise(learn_trial_template, together, WIDTH=1, **of_rule)
+    eligibility = specialise(sum_eligibility_template, together, **of_rule)
+    learn = specialise(learn_trial_template, together, **of_rule, sum_eligibility=eligibility)
     # The log holds amounts whatever the rule: it needs the room that rules with an error ask for.
     all_ = {**of_neuron, **of_rule, "USES_ERROR": True, "run_trial": trial, "learn_trial": learn}
+
+    def study_amounts(
+        mode: Any, parameters: Block, sign: float, heard: Heard, label: int, log: Log, *rest: Any
+    ) -> bool:
+        """The learning step of the standard loop: amounts in place of spikes."""
+        _, weights, previous = rest
+        amounts = log.above[:, 0]
+        taken: bool = study(mode, parameters, sign, heard, label, log, amounts, weights, previous)
+        return taken
+
     return SimpleNamespace(
         train=specialise(train_template, together, **all_),
-        study=specialise(study_template, together, correction=rule.correction, learn_trial=learn),
+        study=study_amounts,
         answer=specialise(answer_template, name, run_trial=trial),
         survive=specialise(survive_template, name, step=step),
         hear=specialise(hear_template, name, step=step),
         foresee=specialise(foresee_template, name, step=step),
     )
-
-
-STEPS = {True: ("continuous_exact", exact_step), False: ("continuous_numerical", numerical_step)}
-"""The step for η = 0 and for other η, each with its name."""

@@ -1,4 +1,8 @@
-"""How much S a continuous neuron gives to each pattern, alone and within trials."""
+"""How much S a continuous neuron gives, to each pattern alone and within trials, and what is wrong.
+
+The functions of a whole trial take S at the bins' edges, the integral from 0 to 0, 1, … T, so that
+they serve the neuron and its chemical counterpart alike.
+"""
 
 from __future__ import annotations
 
@@ -10,44 +14,62 @@ from agents.continuous.simulate import InputSpikes, Trajectory, simulate
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 
-
-def pattern_alone(agent: ContinuousAgent, patterns: Patterns, class_: int) -> InputSpikes:
-    """Pattern `class_` by itself, each spike at the beginning of its bin."""
-    bins, channels = np.nonzero(patterns.dense()[class_])
-    return InputSpikes(bins.astype(np.float64), channels, float(patterns.shape[1]), agent.n_inputs)
+Amounts = NDArray[np.float64]
 
 
-def course_alone(
-    agent: ContinuousAgent, patterns: Patterns, class_: int, points_per_bin: int = 50
-) -> Trajectory:
-    """The neuron's course under pattern `class_` alone, from rest."""
-    spikes = pattern_alone(agent, patterns, class_)
-    at = np.arange(int(spikes.duration) * points_per_bin + 1) / points_per_bin
-    # Each spike twice, the first time just before it, so that a drawn line rises upright.
+def course(agent: ContinuousAgent, spikes: InputSpikes, points_per_bin: int = 50) -> Trajectory:
+    """The neuron's course, from rest, for drawing: each input spike shows as an upright line."""
+    grid = np.arange(int(spikes.duration * points_per_bin) + 1) / points_per_bin
     before = np.nextafter(spikes.times[spikes.times > 0.0], -np.inf)
-    return simulate(agent.neuron, agent.weights, spikes, np.union1d(at, before))
+    at = np.unique(np.concatenate([grid, before, spikes.times]))
+    return simulate(agent.neuron, agent.weights, spikes, at)
 
 
-def outputs_alone(agent: ContinuousAgent, patterns: Patterns) -> NDArray[np.float64]:
-    """S of each pattern presented alone, from rest; float64 (C,)."""
-    courses = [course_alone(agent, patterns, c, 1) for c in range(patterns.shape[0])]
-    return np.array([course.S[-1] for course in courses])
+def pattern_spikes(patterns: Patterns, class_: int) -> InputSpikes:
+    """Pattern `class_` by itself, each spike at the beginning of its bin."""
+    _, n_bins, n_inputs = patterns.shape
+    bins, channels = np.nonzero(patterns.dense()[class_])
+    return InputSpikes(bins.astype(np.float64), channels, float(n_bins), n_inputs)
 
 
-def occurrence_outputs(agent: ContinuousAgent, trial: Trial) -> NDArray[np.float64]:
-    """S of each occurrence in a trial, (K,): what has been there before plays a part."""
-    edges = np.stack([trial.onsets, trial.onsets + trial.pattern_bins]).astype(np.float64)
-    at, place = np.unique(edges, return_inverse=True)
-    S = simulate(agent.neuron, agent.weights, InputSpikes.from_trial(trial), at).S
-    return np.diff(S[place.reshape(edges.shape)], axis=0)[0]
+def outputs_alone(agent: ContinuousAgent, patterns: Patterns) -> Amounts:
+    """S of each pattern presented alone, from rest; (C,)."""
+    alone = [pattern_spikes(patterns, c) for c in range(patterns.shape[0])]
+    return np.array([simulate(agent.neuron, agent.weights, spikes).S[-1] for spikes in alone])
+
+
+def at_edges(agent: ContinuousAgent, trial: Trial) -> Amounts:
+    """S of the neuron at the edges of a trial's bins, (T + 1,)."""
+    at = np.arange(trial.n_bins + 1, dtype=np.float64)
+    return simulate(agent.neuron, agent.weights, InputSpikes.from_trial(trial), at).S
+
+
+def in_occurrences(trial: Trial, S: Amounts) -> Amounts:
+    """S given in each occurrence, (…, K), from S at the edges, (…, T + 1)."""
+    return S[..., trial.onsets + trial.pattern_bins] - S[..., trial.onsets]
+
+
+def in_noise(trial: Trial, S: Amounts) -> Amounts:
+    """S given in each stretch of noise, (…, K + 1), some of them empty; `S` as for occurrences."""
+    begins = np.concatenate([[0], trial.onsets + trial.pattern_bins])
+    ends = np.concatenate([trial.onsets, [trial.n_bins]])
+    return S[..., ends] - S[..., begins]
+
+
+def wrong_outputs(trial: Trial, S: Amounts) -> NDArray[np.int64]:
+    """Wrong outputs in a trial, (…): occurrences whose rounded S is not what they are owed, and
+    stretches of noise with more than ½."""
+    missed = np.floor(in_occurrences(trial, S) + 0.5) != trial.targets
+    false_alarms = in_noise(trial, S) > 0.5
+    return missed.sum(-1) + false_alarms.sum(-1)
 
 
 def outputs_in_trials(
     agent: ContinuousAgent, task: Task, patterns: Patterns, trials: int = 500, seed: int = 0
-) -> list[NDArray[np.float64]]:
+) -> list[Amounts]:
     """S of every occurrence in `trials` trials drawn from `seed`, one array for each class."""
     rng = np.random.default_rng(seed)
     heard = [draw_trial(task, patterns, rng) for _ in range(trials)]
-    S = np.concatenate([occurrence_outputs(agent, trial) for trial in heard])
+    S = np.concatenate([in_occurrences(trial, at_edges(agent, trial)) for trial in heard])
     classes = np.concatenate([trial.classes for trial in heard])
     return [S[classes == c] for c in range(task.n_classes)]
