@@ -140,6 +140,15 @@ class Patterns:
     offsets: NDArray[np.int64]
     shape: tuple[int, int, int]
 
+    def __post_init__(self) -> None:
+        for array in (self.channels, self.offsets):
+            array.setflags(write=False)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Unpickled arrays can be written to until told otherwise."""
+        self.__dict__.update(state)
+        self.__post_init__()
+
     @classmethod
     def draw(cls, task: Task, seed: int) -> Patterns:
         """Draw patterns of `task` at random: each bit is 1 with probability `task.rate`.
@@ -161,8 +170,6 @@ class Patterns:
                 f"got {bits.shape}"
             )
         channels, offsets = sparse(bits.reshape(-1, bits.shape[2]), "patterns")
-        for part in (channels, offsets):
-            part.flags.writeable = False
         return cls(channels, offsets, bits.shape)
 
     def dense(self) -> NDArray[np.bool_]:
@@ -229,7 +236,6 @@ class World(NamedTuple):
     pattern_offsets: NDArray[np.int64]
 
 
-@functools.lru_cache(maxsize=64)
 def world(task: Task, patterns: Patterns) -> World:
     """Task and patterns for compiled code; ValueError if they do not fit each other."""
     expected = (task.n_classes, task.pattern_bins, task.n_inputs)
@@ -243,6 +249,11 @@ def world(task: Task, patterns: Patterns) -> World:
             f"patterns must have shape (n_classes, pattern_bins, n_inputs) = {expected} as the "
             f"task says, got {patterns.shape}"
         )
+    return _world(task, patterns)
+
+
+@functools.lru_cache(maxsize=64)
+def _world(task: Task, patterns: Patterns) -> World:
     with np.errstate(divide="ignore"):
         return World(
             task.n_inputs,
@@ -255,6 +266,8 @@ def world(task: Task, patterns: Patterns) -> World:
             float(-np.log1p(-task.rate)),
             float(-np.log1p(-task.onset_probability)),
             np.array(task.owed, np.int64),
-            patterns.channels,
-            patterns.offsets,
+            # Copies, which can be written to as those that pickle makes can: compiled code is made
+            # anew for read-only arrays.
+            patterns.channels.copy(),
+            patterns.offsets.copy(),
         )

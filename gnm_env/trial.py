@@ -45,6 +45,11 @@ class Trial:
         for array in (self.channels, self.offsets, self.onsets, self.classes, self.targets):
             array.setflags(write=False)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Unpickled arrays can be written to until told otherwise."""
+        self.__dict__.update(state)
+        self.__post_init__()
+
     @property
     def n_bins(self) -> int:
         """T, length of the trial in bins."""
@@ -166,33 +171,24 @@ def draw_trial(task: Task, patterns: Patterns, rng: Generator) -> Trial:
     bin chosen uniformly; T = background_bins + M·Σ k_c. The environments draw the same trials from
     the same generator.
     """
-    return _trial(_draw(rng, world(task, patterns)), task)
+    return draw_next(task, world(task, patterns), Generators([rng]))
 
 
 def draw_next(task: Task, numbers: World, generators: Generators) -> Trial:
-    """`draw_trial` from the first of `generators`, at less cost."""
-    return _trial(_draw_held(generators.held, numbers), task)
-
-
-def _trial(arrays: tuple[NDArray[Any], ...], task: Task) -> Trial:
-    channels, offsets, onsets, classes, targets = arrays
+    """`draw_trial` from the first of `generators`, for a caller who keeps them: at less cost."""
+    channels, offsets, onsets, classes, targets = _draw(generators.held, numbers)
     return Trial(channels, offsets, onsets, classes, targets, task.n_inputs, task.pattern_bins)
 
 
 @compiled
-def _draw_held(held: Any, world: World) -> tuple[NDArray[Any], ...]:
-    return _draw(held[0], world)
-
-
-@compiled
 def _draw(
-    rng: Generator, world: World
+    held: Any, world: World
 ) -> tuple[
     NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
 ]:
     """Channels, offsets, onsets, classes and targets of one trial, in arrays of their own."""
     channels, offsets, onsets, classes, n_bins, n_occurrences, _ = append_trial(
-        rng,
+        held[0],
         world,
         np.empty(256, np.int32),
         np.zeros(512, np.int64),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -145,12 +146,15 @@ class PatternTrialEnv(PatternEnv):
         return row, reward, True, False, self._terminal_info()
 
     def _amount_from(self, action: Any) -> float:
-        amount = np.asarray(action, np.float64)
-        if amount.size != 1 or not 0.0 <= amount.item() <= self.max_output:
+        try:
+            amount = float(np.asarray(action, np.float64).item())
+        except (TypeError, ValueError):
+            amount = math.nan
+        if not 0.0 <= amount <= self.max_output:
             raise ValueError(
                 f"action must be one amount in 0 … {self.max_output:g} (max_output), got {action!r}"
             )
-        return float(amount.item())
+        return amount
 
     def _account(self, output: float) -> float:
         """Dense feedback for the bin shown last; also shows that bin to the picture."""
