@@ -33,6 +33,7 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
+_intrinsic: Any = intrinsic  # called from compiled code, without the typing context
 _DOUBLE = ir.DoubleType()
 _BIT = ir.IntType(1)
 _INT32 = ir.IntType(32)
@@ -129,13 +130,14 @@ for _name, _symbol in (
     ("le", "<="),
     ("lt", "<"),
     ("eq", "=="),
-    ("ne", "!="),
 ):
     _binary(
         getattr(operator, _name),
         Mask,
         lambda b, x, y, _symbol=_symbol: b.fcmp_ordered(_symbol, x, y),
     )
+# NaN differs from every number, itself included, as for plain numbers.
+_binary(operator.ne, Mask, lambda b, x, y: b.fcmp_unordered("!=", x, y))
 
 
 def _logical(op: Any, emit: Callable[..., Any]) -> None:
@@ -153,7 +155,7 @@ _logical(operator.and_, lambda builder, x, y: builder.and_(x, y))
 _logical(operator.or_, lambda builder, x, y: builder.or_(x, y))
 
 
-@intrinsic
+@_intrinsic
 def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
     """`x` in the lanes where `mask` holds, `y` in the others."""
     width = _width(mask)
@@ -165,7 +167,7 @@ def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
     return _lanes(width)(mask, x, y), generate
 
 
-@intrinsic
+@_intrinsic
 def any_lane(typing_context: Any, mask: Any) -> Any:
     """Whether `mask` holds in any lane."""
 
@@ -178,7 +180,7 @@ def any_lane(typing_context: Any, mask: Any) -> Any:
     return types.boolean(mask), generate
 
 
-@intrinsic
+@_intrinsic
 def negated(typing_context: Any, mask: Any) -> Any:
     """Where `mask` does not hold (``~`` of a plain bool is a number, hence this function)."""
     return mask(mask), lambda context, builder, sig, args: builder.not_(args[0])
@@ -203,7 +205,7 @@ def _store_row(context: Any, builder: Any, array: Any, value: Any, row: Any, x: 
     builder.store(x, builder.inttoptr(address, x.type.as_pointer())).align = 8
 
 
-@intrinsic
+@_intrinsic
 def load(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
     """Row `row` of the float64 array `block` of shape (rows, W), W the lanes of `x`."""
 
@@ -213,7 +215,7 @@ def load(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
     return _lanes(_width(x))(block, types.intp, x), generate
 
 
-@intrinsic
+@_intrinsic
 def store(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
     """Write the lanes of `x` into row `row` of `block`."""
 
@@ -224,7 +226,7 @@ def store(typing_context: Any, block: Any, row: Any, x: Any) -> Any:
     return types.void(block, types.intp, x), generate
 
 
-@intrinsic(prefer_literal=True)
+@_intrinsic(prefer_literal=True)
 def full(typing_context: Any, number: Any, width: Any) -> Any:
     """`number` in every lane."""
     lanes = width.literal_value
@@ -236,7 +238,7 @@ def full(typing_context: Any, number: Any, width: Any) -> Any:
     return _lanes(lanes)(types.float64, width), generate
 
 
-@intrinsic
+@_intrinsic
 def like(typing_context: Any, number: Any, x: Any) -> Any:
     """`number` in as many lanes as `x` has."""
 
@@ -251,7 +253,7 @@ def _named_tuple(type_: Any, x: Any) -> Any:
     return types.BaseTuple.from_types([_lanes(_width(x))] * len(cls._fields), cls)
 
 
-@intrinsic
+@_intrinsic
 def unpack(typing_context: Any, type_: Any, block: Any, x: Any) -> Any:
     """A `type_` (a NamedTuple class) whose fields are the rows of `block`, in order."""
     result = _named_tuple(type_, x)
@@ -264,7 +266,7 @@ def unpack(typing_context: Any, type_: Any, block: Any, x: Any) -> Any:
     return result(type_, block, x), generate
 
 
-@intrinsic
+@_intrinsic
 def pack(typing_context: Any, block: Any, x: Any) -> Any:
     """Write the fields of the NamedTuple `x` into the rows of `block`, in order."""
 
@@ -277,7 +279,7 @@ def pack(typing_context: Any, block: Any, x: Any) -> Any:
     return types.void(block, x), generate
 
 
-@intrinsic
+@_intrinsic
 def repeated(typing_context: Any, type_: Any, x: Any) -> Any:
     """A `type_` (a NamedTuple class) whose fields are all `x`."""
     result = _named_tuple(type_, x)
@@ -288,7 +290,7 @@ def repeated(typing_context: Any, type_: Any, x: Any) -> Any:
     return result(type_, x), generate
 
 
-@intrinsic
+@_intrinsic
 def power(typing_context: Any, x: Any, y: Any) -> Any:
     """x**y, lane by lane: the C library's `pow`, whatever the number of lanes."""
 
