@@ -56,7 +56,7 @@ def register_kind(kind: str) -> Callable[[_Class], _Class]:
 
 @contextlib.contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """A binary file that takes the place of `path` once it is complete; a failure leaves the old one.
+    """A binary file that takes the place of `path` once complete; a failure leaves the old one.
 
     Raises ValueError if the folder cannot be written.
     """
@@ -107,7 +107,7 @@ def write(
         full_header["rng"] = rng.bit_generator.state
     text = json.dumps(full_header, default=_plain).encode()
     with atomic_write(path) as file:
-        np.savez(file, **{_HEADER: np.frombuffer(text, np.uint8)}, **contents)
+        np.savez(file, allow_pickle=False, **{_HEADER: np.frombuffer(text, np.uint8)}, **contents)
 
 
 def _plain(value: Any) -> Any:

@@ -90,7 +90,7 @@ class MistakeRate:
 
 
 def mistake_rate(survived: ArrayLike, cap: int = MAX_EPISODE_BINS) -> MistakeRate:
-    """The mistake rate of runs that survived so many bins each; those at the cap made no mistake."""
+    """The mistake rate of runs that survived so many bins; those at the cap made no mistake."""
     from scipy.stats import chi2
 
     bins = np.asarray(survived)

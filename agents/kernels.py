@@ -289,8 +289,8 @@ def survive_template(
 ) -> Block:
     """Bins that each neuron survives on one endless stream from `rng`, at most `cap`.
 
-    A mistake is any spike in noise, one spike too many in an occurrence, or too few by its last bin;
-    the bin of the mistake is not counted. Returns shape (blocks, 1, WIDTH).
+    A mistake is any spike in noise, one spike too many in an occurrence, or too few by its last
+    bin; the bin of the mistake is not counted. Returns shape (blocks, 1, WIDTH).
     """
     zero = full(0.0, WIDTH)
     n_blocks = len(weights)
@@ -348,7 +348,7 @@ def answer_template(
     channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
     onsets, classes = np.empty(8, np.int64), np.empty(8, np.int64)
     for _ in range(trials):
-        channels, offsets, onsets, classes, n_bins, n_occurrences, label = append_trial(
+        channels, offsets, onsets, classes, n_bins, n_occurrences, _ = append_trial(
             rng, world, channels, offsets, onsets, classes, 0, 0
         )
         heard = Heard(

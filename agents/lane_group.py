@@ -40,7 +40,7 @@ class LaneGroup(Protocol):
         """
 
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
-        """Bins survived by each agent on the endless stream of `rng`, learning off, at most `cap`."""
+        """Bins that each agent survives on the endless stream of `rng`, at most `cap`."""
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         """Responses to `trials` trials drawn from `rng`, learning off."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import os
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
@@ -132,7 +133,7 @@ def _parts(places: list[int], threads: int) -> list[list[int]]:
     """At most `threads` runs of nearly equal length, whole blocks of lanes each."""
     blocks = -(-len(places) // LANES_PER_UNIT)
     cuts = np.linspace(0, blocks, min(threads, blocks) + 1).round().astype(int) * LANES_PER_UNIT
-    return [places[a:b] for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+    return [places[a:b] for a, b in itertools.pairwise(cuts)]
 
 
 def _require_memory(agents: Sequence[Any], task: Task) -> None:

@@ -27,6 +27,8 @@ from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial
 
 NEURONS: dict[str, type[Neuron]] = {cls.name: cls for cls in (GNM, LIF, MST)}
+_RECORD = ("_channels", "_offsets", "_V", "_above", "_spikes")
+"""An agent's record of the present trial, for learning at its end."""
 RULES: dict[str, type[Rule]] = {cls.name: cls for cls in (AggregateLabel, ErrorTrace)}
 
 
@@ -174,20 +176,14 @@ class NeuronAgent:
 
     def _make_room(self, bins: int, events: int) -> None:
         """Buffers for at least `bins` bins and `events` input spikes; what they hold is kept."""
-        old = (
-            (self._channels, self._offsets, self._V, self._above, self._spikes)
-            if hasattr(self, "_channels")
-            else None
-        )
+        old = [getattr(self, name) for name in _RECORD] if hasattr(self, "_V") else []
         self._channels = np.empty(events, np.int32)
         self._offsets = np.zeros(bins + 1, np.int64)
         self._V = np.empty((bins, 1))
         self._above = np.empty((bins, 1))
         self._spikes = np.empty(bins, np.int64)
-        if old is not None:
-            new = (self._channels, self._offsets, self._V, self._above, self._spikes)
-            for short, long in zip(old, new, strict=True):
-                long[: len(short)] = short
+        for name, short in zip(_RECORD, old, strict=False):
+            getattr(self, name)[: len(short)] = short
 
     # --- without learning ------------------------------------------------------------------------
 
@@ -225,7 +221,8 @@ class NeuronAgent:
         values, spikes = recorder(self.neuron)(
             self._mode, self._parameters, self._weights[:, None], heard
         )
-        return Recording(*values, spikes)
+        V, D, R, X = values
+        return Recording(V, D, R, X, spikes)
 
     def _checked(self, obs: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.int8]:
         if type(obs) is not np.ndarray or obs.dtype != np.int8 or not obs.flags.c_contiguous:

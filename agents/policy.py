@@ -1,4 +1,4 @@
-"""Score anything that has Stable-Baselines3's `predict`, on the streams that neurons are scored on."""
+"""Score anything that has Stable-Baselines3's `predict` on the streams that score the neurons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gnm_env.task import Patterns, Task
-from gnm_env.vector_env import VectorPatternStreamEnv
+from gnm_env.vector_env import PatternStreamVectorEnv
 
 
 class Policy(Protocol):
@@ -35,7 +35,7 @@ def survive_streams(
     Run k hears the stream of `gnm/PatternStream-v0` after `reset(seed=seed + k)`. The streams run
     side by side, with one `predict` for a bin of all of them.
     """
-    streams = VectorPatternStreamEnv(runs, task, patterns)
+    streams = PatternStreamVectorEnv(runs, task, patterns)
     bits, _ = streams.reset(seed=seed)
     survived, alive = np.zeros(runs, np.int64), np.ones(runs, np.bool_)
     state, begins = None, np.ones(runs, np.bool_)

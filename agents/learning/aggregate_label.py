@@ -14,7 +14,7 @@ from gnm_env.checks import real
 from gnm_env.compiled import compiled
 
 _INSERTED = 48
-"""Up to this many of the largest eligibilities are found by insertion, more of them by selection."""
+"""Up to this many of the largest eligibilities are found by insertion, more by selection."""
 
 
 @compiled

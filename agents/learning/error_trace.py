@@ -41,8 +41,8 @@ def weight_change(
 class ErrorTrace(Rule):
     """Error-trace learning (ET) of Fil & Chu.
 
-    The error trace E(t) is, over each occurrence of a pattern, the spikes that it is owed less those
-    given in it; over noise −1 in every bin in which the readout is at or above the threshold.
+    The error trace E(t) is, over each occurrence of a pattern, the spikes that it is owed less
+    those given in it; over noise −1 in every bin in which the readout is at or above the threshold.
     Raises ValueError if a parameter is out of range.
 
     Attributes:

@@ -60,7 +60,7 @@ def hill_template(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
     Far from ϑ_B the function is flat to within rounding, and the power is not computed.
     """
     if RECOVERY == INFINITE:
-        return where(V > p.theta_b, 1.0, where(V == p.theta_b, 0.5, like(0.0, V)))
+        return where(p.theta_b < V, 1.0, where(p.theta_b == V, 0.5, like(0.0, V)))
     u = V / p.theta_b
     H = where(u > 1.0, 1.0, like(0.0, V))
     steep = (u > p.flat_below) & (u < p.flat_above)
@@ -88,8 +88,8 @@ def step_template(
         R = state.R + p.zeta * hill(p, mode, state.V) - p.beta * state.R
     V = state.V + drive - D
     X = V if mode[0] == 0 else D
-    above = X >= p.theta_r
-    spike = above & negated(state.X >= p.theta_r)
+    above = p.theta_r <= X
+    spike = above & negated(p.theta_r <= state.X)
     return State(V, R, X), Response(V, D, R, X, above, spike)
 
 
