@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import commandline
 from agents import load_checkpoint
 from agents.checkpoint import Checkpoint, atomic_write
-from agents.chemistry import ReactionNetwork, Reactor, antimony, sbml
+from agents.chemistry import Course, ReactionNetwork, Reactor, antimony, sbml
 from agents.chemistry.mistakes import MOLECULES, Mistakes, count_mistakes
 from agents.chemistry.network import CONVERSION
-from agents.continuous import InputSpikes
+from agents.continuous import InputSpikes, Trajectory
 from agents.continuous.outputs import course, in_occurrences, outputs_alone, pattern_spikes
 from agents.evaluation import bootstrap_interval
 from gnm_env import Patterns, Task, Trial
@@ -47,8 +49,23 @@ def export(path: Path, network: ReactionNetwork, spikes: InputSpikes, molecules:
         file.write(text.encode())
 
 
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """The network's answer to one trial.
+
+    Attributes:
+        deterministic: with infinitely many molecules.
+        shown: for each number of molecules the first stochastic run.
+        S: float64 (runs, K) for each number of molecules, S of each occurrence in each run.
+    """
+
+    deterministic: Course
+    shown: dict[int, Course]
+    S: dict[int, NDArray[np.float64]]
+
+
 def main(options: argparse.Namespace) -> dict[str, Any]:
-    """What the command line asks for; missing packages are bad input like any other."""
+    """What the command line asks for; a missing package is bad input like any other."""
     try:
         return _main(options)
     except ImportError as error:
@@ -64,22 +81,28 @@ def _main(options: argparse.Namespace) -> dict[str, Any]:
     spikes = InputSpikes.from_trial(trial)
     result: dict[str, Any] = {
         "checkpoint": str(options.checkpoint),
-        "molecules": options.molecules,
         "conversion": network.conversion,
-        "outputs_alone": outputs_alone(saved.agent, patterns).tolist(),
         "targets": list(task.owed),
+        "outputs_alone": outputs_alone(saved.agent, patterns).tolist(),
     }
     if options.export is not None:
         export(options.export, network, spikes, options.molecules[0])
         result["export"] = str(options.export)
         print(f"model with {len(spikes.times)} input spikes: {options.export}")
-    result |= _simulate(options, network, trial, spikes)
+
+    traces = simulate(network, trial, options.molecules, options.runs, options.seed)
+    result |= _print_traces(trial, traces)
+    mistakes = None
     if options.trials:
-        result |= _count(options, saved.agent, task, patterns)
+        with Progress("trials", options.trials) as progress:
+            mistakes = count_mistakes(
+                saved.agent, task, patterns, MOLECULES, options.trials, options.seed,
+                options.conversion, progress.advance,
+            )  # fmt: skip
+        result["wrong_outputs"] = _print_mistakes(mistakes)
     if options.out is not None:
-        result["figures"] = _draw_classes(options.out, saved.agent, task, patterns) + result.get(
-            "figures", []
-        )
+        courses = [course(saved.agent, pattern_spikes(patterns, c)) for c in range(task.n_classes)]
+        result["figures"] = _draw(options.out, task, network, trial, courses, traces, mistakes)
     return result | {"seconds": round(time.monotonic() - began, 2)}
 
 
@@ -91,97 +114,85 @@ def _task(saved: Checkpoint, path: Path) -> tuple[Task, Patterns]:
     return saved.task, saved.patterns
 
 
-def _simulate(
-    options: argparse.Namespace, network: ReactionNetwork, trial: Trial, spikes: InputSpikes
-) -> dict[str, Any]:
+def simulate(
+    network: ReactionNetwork, trial: Trial, molecules: list[int], runs: int, seed: int
+) -> Traces:
     """One deterministic trace, and `runs` stochastic ones for each number of molecules."""
-    reactor = Reactor(network)
-    deterministic = reactor.deterministic(spikes)
-    _print_row("deterministic", in_occurrences(trial, _edges(deterministic, trial)), None)
-    shown, rows = {}, {}
-    with Progress("stochastic runs", options.runs * len(options.molecules)) as progress:
-        for molecules in options.molecules:
-            S = []
-            for run in range(options.runs):
-                one = reactor.stochastic(spikes, molecules, seed=options.seed + run)
-                shown.setdefault(molecules, one)
-                S.append(in_occurrences(trial, _edges(one, trial))[0])
+    spikes, reactor = InputSpikes.from_trial(trial), Reactor(network)
+    traces = Traces(reactor.deterministic(spikes), {}, {})
+    with Progress("stochastic runs", runs * len(molecules)) as progress:
+        for number in molecules:
+            amounts = []
+            for run in range(runs):
+                one = reactor.stochastic(spikes, number, seed=seed + run)
+                traces.shown.setdefault(number, one)
+                amounts.append(_given(trial, one)[0])
                 progress.advance()
-            rows[molecules] = np.array(S)
-    for molecules, amounts in rows.items():
-        spread = amounts.std(axis=0, ddof=1) if options.runs > 1 else None
-        _print_row(f"{molecules} molecules", amounts.mean(axis=0), spread)
-    result: dict[str, Any] = {
-        "deterministic_S": in_occurrences(trial, _edges(deterministic, trial)).tolist(),
-        "stochastic_S": {str(m): amounts.mean(axis=0).tolist() for m, amounts in rows.items()},
-    }
-    if options.out is not None:
-        from figures_continuous import draw_volumes, save
-
-        paths = save(draw_volumes(trial, deterministic, shown), options.out / "F8_volumes")
-        result["figures"] = [str(path) for path in paths]
-    return result
+            traces.S[number] = np.array(amounts)
+    return traces
 
 
-def _edges(course: Any, trial: Trial) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _given(trial: Trial, course: Course) -> NDArray[np.float64]:
+    """S of each occurrence."""
     S = course.S()
-    return S[..., :: (S.shape[-1] - 1) // trial.n_bins]
+    return in_occurrences(trial, S[..., :: (S.shape[-1] - 1) // trial.n_bins])
 
 
-def _print_row(name: str, S: Any, spread: Any) -> None:
-    cells = [
-        f"class {c + 1}: {amount:5.2f}" + ("" if spread is None else f" ± {spread[c]:.2f}")
-        for c, amount in enumerate(S)
-    ]
-    print(f"{name:>16}   S of " + ",  ".join(cells))
-
-
-def _count(
-    options: argparse.Namespace, agent: Any, task: Task, patterns: Patterns
-) -> dict[str, Any]:
-    """Wrong outputs per trial for each of many numbers of molecules."""
-    with Progress("trials", options.trials) as progress:
-        mistakes = count_mistakes(
-            agent,
-            task,
-            patterns,
-            MOLECULES,
-            options.trials,
-            options.seed,
-            options.conversion,
-            progress.advance,
+def _print_traces(trial: Trial, traces: Traces) -> dict[str, Any]:
+    exact = _given(trial, traces.deterministic)
+    rows = {"deterministic": (exact, np.zeros_like(exact))}
+    rows |= {f"{m} molecules": (S.mean(axis=0), S.std(axis=0)) for m, S in traces.S.items()}
+    for name, (mean, spread) in rows.items():
+        cells = ",  ".join(
+            f"class {c + 1}: {mean[c]:5.2f} ± {spread[c]:.2f}" for c in trial.classes
         )
-    print("wrong outputs per trial (mean, 95 % interval)")
-    for molecules, row in zip(mistakes.molecules, mistakes.stochastic, strict=True):
-        low, high = bootstrap_interval(row)
-        print(f"{molecules:>16,} molecules  {row.mean():6.3f}  ({low:.3f} … {high:.3f})")
+        print(f"{name:>16}   S of {cells}")
+    return {
+        "deterministic_S": exact.tolist(),
+        "stochastic_S": {str(m): S.mean(axis=0).tolist() for m, S in traces.S.items()},
+    }
+
+
+def _print_mistakes(mistakes: Mistakes) -> dict[str, Any]:
+    intervals = [bootstrap_interval(row) for row in mistakes.stochastic]
+    mean = mistakes.stochastic.mean(axis=1)
+    print(f"wrong outputs per trial, {mistakes.neuron.size} trials (95 % interval)")
+    for number, rate, (low, high) in zip(mistakes.molecules, mean, intervals, strict=True):
+        print(f"{number:>16,} molecules  {rate:6.3f}  ({low:.3f} … {high:.3f})")
     print(f"{'deterministic':>26}  {mistakes.deterministic.mean():6.3f}")
     print(f"{'neuron':>26}  {mistakes.neuron.mean():6.3f}")
-    result = {"wrong_outputs": _described(mistakes)}
-    if options.out is not None:
-        from figures_continuous import draw_mistakes, save
-
-        save(draw_mistakes(mistakes), options.out / "F8_mistakes")
-    return result
-
-
-def _described(mistakes: Mistakes) -> dict[str, Any]:
     return {
         "trials": int(mistakes.neuron.size),
         "molecules": mistakes.molecules.tolist(),
-        "mean": mistakes.stochastic.mean(axis=1).tolist(),
-        "ci95": [bootstrap_interval(row) for row in mistakes.stochastic],
+        "mean": mean.tolist(),
+        "ci95": intervals,
         "deterministic": float(mistakes.deterministic.mean()),
         "neuron": float(mistakes.neuron.mean()),
     }
 
 
-def _draw_classes(out: Path, agent: Any, task: Task, patterns: Patterns) -> list[str]:
-    from figures_continuous import draw_classes, save
+def _draw(
+    folder: Path,
+    task: Task,
+    network: ReactionNetwork,
+    trial: Trial,
+    courses: list[Trajectory],
+    traces: Traces,
+    mistakes: Mistakes | None,
+) -> list[str]:
+    """Write the figures as PDF and PNG; returns their paths."""
+    import matplotlib
 
-    courses = [course(agent, pattern_spikes(patterns, c)) for c in range(task.n_classes)]
-    figure = draw_classes(courses, task.owed, agent.neuron.theta_r)
-    return [str(path) for path in save(figure, out / "F2_classes")]
+    matplotlib.use("Agg")
+    from figures_continuous import draw_classes, draw_mistakes, draw_volumes, save
+
+    figures = {
+        "F2_classes": draw_classes(courses, task.owed, network.theta_r),
+        "F8_volumes": draw_volumes(trial, traces.deterministic, traces.shown),
+    }
+    if mistakes is not None:
+        figures["F8_mistakes"] = draw_mistakes(mistakes)
+    return [str(path) for name in figures for path in save(figures[name], folder / name)]
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -109,7 +109,7 @@ def _crossing(V: float, V_end: float, d: float, d_end: float, level: float) -> f
 @compiled
 def _step(
     rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """One step of length dt, or up to the step of H if V falls through it: V, R, S, time left."""
     above = rates.theta_b < V
     V_end, R_end = _runge_kutta(rates, mode, above, V, R, dt)
