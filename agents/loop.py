@@ -49,7 +49,7 @@ def train(
     for start in range(0, trials, block):
         size = min(block, trials - start)
         wrong, absolute = 0, 0.0
-        for _ in range(size):
+        for trial in range(start, start + size):
             obs, info = env.reset(seed=seed)
             seed = None
             agent.begin_trial()
@@ -61,13 +61,15 @@ def train(
             error = abs(info["label"] - info["emitted"])
             wrong += error > getattr(env.unwrapped, "tolerance", 0.0)
             absolute += error
+            if agent.overflowed and history.overflowed < 0:
+                history.overflowed = np.array(trial)
         history.append(size, wrong, absolute)
-        if agent.overflowed:
-            history.overflowed = np.array(start + size - 1)
-            warn_of_overflow("the agent", start + size)
-            break
         if callback is not None and callback(start + size, history) is False:
             break
+        if agent.overflowed:
+            break
+    if history.overflowed >= 0:
+        warn_of_overflow("the agent", int(history.overflowed) + 1)
     return history
 
 
