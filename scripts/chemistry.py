@@ -181,9 +181,6 @@ def _draw(
     mistakes: Mistakes | None,
 ) -> list[str]:
     """Write the figures as PDF and PNG; returns their paths."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     from figures_continuous import draw_classes, draw_mistakes, draw_volumes, save
 
     figures = {

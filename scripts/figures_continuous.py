@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from agents.chemistry.mistakes import Mistakes
@@ -14,20 +16,16 @@ from agents.chemistry.reactor import Course
 from agents.continuous.outputs import in_occurrences
 from agents.continuous.simulate import Trajectory
 from agents.evaluation import bootstrap_interval
+from drawing.style import BLUE, GREY, INK, NARROW, WIDE, panels, plt, styled
 from gnm_env.trial import Trial
+from pictures import class_colour
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-# Okabe and Ito: told apart by colour-blind readers, and in grey print by their lightness.
-BLUE, SKY, ORANGE, GREEN, GREY = "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#8C8C8C"
-CLASS_COLOURS = (ORANGE, GREEN, SKY, "#CC79A7")
-VOLUME_COLOURS = (SKY, ORANGE, GREEN, "#CC79A7", BLUE)
+TRACE_COLOURS = ("#56B4E9", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+"""Okabe and Ito's; each trace has a panel of its own besides."""
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write `figure` as PDF and PNG beside each other; returns both paths.
+    """Write `figure` as PDF and PNG beside each other, close it, and return both paths.
 
     Raises ValueError if the folder cannot be written.
     """
@@ -35,140 +33,116 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            figure.savefig(path, dpi=200)
+            # No date in the file: the same results give the same bytes.
+            metadata = {"CreationDate": None} if path.suffix == ".pdf" else None
+            with styled():
+                figure.savefig(path, metadata=metadata)
     except OSError as error:
         raise ValueError(
             f"cannot write {stem.parent}: {error.strerror}; choose a folder that is writable"
         ) from None
+    plt.close(figure)
     return paths
 
 
 def draw_classes(courses: Sequence[Trajectory], targets: Sequence[int], theta_r: float) -> Figure:
     """F2: V(t) of a trained neuron under each pattern alone, S shaded and its value printed."""
-    figure, axes = _panels(len(courses), height=2.1)
-    top = 1.12 * max(float(course.V.max()) for course in courses)
-    for c, (axis, course) in enumerate(zip(axes, courses, strict=True)):
-        axis.fill_between(
-            course.t,
-            course.V,
-            where=list(theta_r < course.V),
-            color=BLUE,
-            alpha=0.35,
-            linewidth=0,
-            label=r"$S=\int\Theta(V-\vartheta_R)\,V\,dt$",
-        )
-        axis.plot(course.t, course.V, color="black", linewidth=0.9, label="$V(t)$")
-        _threshold(axis, theta_r)
-        axis.set_ylim(0.0, top)
-        axis.set_xlim(0.0, float(course.t[-1]))
-        axis.set_title(
-            f"Pattern of class {c + 1}: $S$ = {course.S[-1]:.2f}, owed {targets[c]}",
-            loc="left",
-            fontsize=9,
-        )
-    axes[0].legend(loc="upper right", fontsize=7, frameon=False, ncols=3)
-    axes[-1].set_xlabel("time (bins)")
-    figure.supylabel("membrane potential $V$", fontsize=9)
+    with styled():
+        figure, grid = panels(len(courses), 1, width=WIDE, height=1.9 * len(courses), sharex=True)
+        axes: list[Axes] = list(grid[:, 0])
+        top = 1.2 * max(theta_r, *(float(course.V.max()) for course in courses))
+        for c, (axis, course) in enumerate(zip(axes, courses, strict=True)):
+            axis.fill_between(
+                course.t,
+                course.V,
+                where=list(theta_r < course.V),
+                color=BLUE,
+                alpha=0.45,
+                linewidth=0,
+                label=r"$S=\int\Theta(V-\vartheta_R)\,V\,dt$",
+            )
+            axis.plot(course.t, course.V, color=INK, linewidth=0.9, label="$V(t)$")
+            _threshold(axis, theta_r)
+            axis.set(xlim=(0.0, float(course.t[-1])), ylim=(0.0, top))
+            axis.set_title(
+                f"pattern of class {c + 1}: $S$ = {course.S[-1]:.2f}, owed {targets[c]}", loc="left"
+            )
+        # Above the first panel's frame, where no trace can be.
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderpad=0.1)
+        axes[-1].set_xlabel("time (bins)")
+        figure.supylabel("membrane potential $V$", fontsize=8)
     return figure
 
 
 def draw_volumes(trial: Trial, deterministic: Course, stochastic: Mapping[int, Course]) -> Figure:
     """F8: stochastic traces over the deterministic one (black), all with the same input."""
-    figure, axes = _panels(1 + len(stochastic), height=1.5)
-    top = 1.1 * max(float(c.V.max()) for c in (deterministic, *stochastic.values()))
-    rows = [
-        ("infinitely many molecules (deterministic; black in every panel)", deterministic, "black")
-    ]
+    rows = [("infinitely many molecules (black in every panel)", deterministic, INK)]
     rows += [
-        (f"{molecules} molecules per input spike", course, VOLUME_COLOURS[k % len(VOLUME_COLOURS)])
-        for k, (molecules, course) in enumerate(stochastic.items())
+        (f"{number:,} molecules per input spike", course, TRACE_COLOURS[k % len(TRACE_COLOURS)])
+        for k, (number, course) in enumerate(stochastic.items())
     ]
-    for axis, (name, course, colour) in zip(axes, rows, strict=True):
-        V, S = np.atleast_2d(course.V)[0], np.atleast_2d(course.S())[0]
-        _occurrences(axis, trial)
-        if colour != "black":
-            axis.plot(course.t, V, color=colour, linewidth=0.8)
-        axis.plot(deterministic.t, deterministic.V, color="black", linewidth=0.8)
-        _threshold(axis, course.theta_r)
-        axis.set_ylim(0.0, top)
-        axis.set_xlim(0.0, trial.n_bins)
-        axis.set_title(name, loc="left", fontsize=8, pad=3)
-        _print_outputs(axis, trial, S[:: (len(S) - 1) // trial.n_bins])
-    axes[-1].set_xlabel("time (bins)")
-    figure.supylabel("$V$ (molecules per input spike)", fontsize=9)
+    top = 1.15 * max(deterministic.theta_r, *(float(course.V.max()) for _, course, _ in rows))
+    with styled():
+        figure, grid = panels(len(rows), 1, width=WIDE, height=1.45 * len(rows), sharex=True)
+        for axis, (name, course, colour) in zip(grid[:, 0], rows, strict=True):
+            axis.set(xlim=(0.0, trial.n_bins), ylim=(0.0, top))
+            _occurrences(axis, trial, np.atleast_2d(course.S())[0])
+            if course is not deterministic:
+                axis.plot(course.t, np.atleast_2d(course.V)[0], color=colour, linewidth=0.9)
+            axis.plot(deterministic.t, deterministic.V, color=INK, linewidth=0.7)
+            _threshold(axis, course.theta_r)
+            axis.set_title(name, loc="left")
+        grid[-1, 0].set_xlabel("time (bins)")
+        figure.supylabel("$V$ (molecules per input spike)", fontsize=8)
     return figure
 
 
 def draw_mistakes(mistakes: Mistakes) -> Figure:
     """Wrong outputs per trial against molecules per input spike, with 95 % intervals."""
-    from matplotlib import pyplot as plt
-
-    figure, axis = plt.subplots(figsize=(5.0, 3.4), layout="constrained")
     mean = mistakes.stochastic.mean(axis=1)
     interval = np.array([bootstrap_interval(row) for row in mistakes.stochastic])
-    axis.errorbar(
-        mistakes.molecules,
-        mean,
-        yerr=np.abs(interval.T - mean),
-        color=BLUE,
-        marker="o",
-        markersize=4,
-        linewidth=1.0,
-        capsize=2.5,
-        label="molecule by molecule",
-    )
-    for values, style, name in (
-        (mistakes.deterministic, "--", "infinitely many molecules"),
-        (mistakes.neuron, ":", "the neuron itself ($C\\to\\infty$)"),
-    ):
-        axis.axhline(values.mean(), color="black", linestyle=style, linewidth=1.0, label=name)
-    axis.set_xscale("log")
-    axis.set_xticks(mistakes.molecules, [str(m) for m in mistakes.molecules])
-    axis.minorticks_off()
-    axis.set_ylim(bottom=0.0)
-    axis.set_xlabel("molecules per input spike")
-    axis.set_ylabel("wrong outputs per trial")
-    axis.legend(frameon=False, fontsize=8)
-    axis.spines[["top", "right"]].set_visible(False)
+    with styled():
+        figure, grid = panels(1, 1, width=1.3 * NARROW, height=0.85 * NARROW)
+        axis: Axes = grid[0, 0]
+        axis.errorbar(
+            mistakes.molecules,
+            mean,
+            yerr=np.abs(interval.T - mean),
+            color=BLUE,
+            marker="o",
+            markersize=4,
+            linewidth=1.0,
+            capsize=2.5,
+            label="molecule by molecule (mean, 95 % interval)",
+        )
+        limits = (
+            (mistakes.deterministic, "--", "infinitely many molecules"),
+            (mistakes.neuron, ":", "the neuron itself ($C\\to\\infty$ too)"),
+        )
+        for values, style, name in limits:
+            axis.axhline(values.mean(), color=INK, linestyle=style, linewidth=1.0, label=name)
+        axis.set_xscale("log")
+        axis.set_xticks(mistakes.molecules, [f"{number:,}" for number in mistakes.molecules])
+        axis.minorticks_off()
+        # A little below 0, so that lines at 0 do not hide in the frame.
+        axis.set_ylim(bottom=-0.03 * max(float(interval.max()), 1.0))
+        axis.set(xlabel="molecules per input spike", ylabel="wrong outputs per trial")
+        axis.legend()
     return figure
 
 
-def _panels(rows: int, height: float) -> tuple[Figure, NDArray[Any]]:
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(
-        rows,
-        1,
-        figsize=(6.5, height * rows + 0.5),
-        sharex=True,
-        squeeze=False,
-        layout="constrained",
-    )
-    for axis in axes[:, 0]:
-        axis.spines[["top", "right"]].set_visible(False)
-    return figure, axes[:, 0]
-
-
 def _threshold(axis: Axes, theta_r: float) -> None:
-    axis.axhline(
-        theta_r, color=GREY, linestyle="--", linewidth=0.8, label=r"threshold $\vartheta_R$"
-    )
+    label = r"threshold $\vartheta_R$"
+    axis.axhline(theta_r, color=GREY, linestyle="--", linewidth=0.8, label=label)
 
 
-def _occurrences(axis: Axes, trial: Trial) -> None:
-    for onset, class_ in zip(trial.onsets, trial.classes, strict=True):
-        colour = CLASS_COLOURS[class_ % len(CLASS_COLOURS)]
-        axis.axvspan(onset, onset + trial.pattern_bins, color=colour, alpha=0.15, linewidth=0)
-
-
-def _print_outputs(axis: Axes, trial: Trial, S: NDArray[np.float64]) -> None:
-    """The S of each occurrence at the top of its shade."""
-    for k, amount in enumerate(in_occurrences(trial, S)):
-        axis.text(
-            trial.onsets[k] + trial.pattern_bins / 2,
-            0.97 * axis.get_ylim()[1],
-            f"class {trial.classes[k] + 1}: $S$ = {amount:.2f}",
-            ha="center",
-            va="top",
-            fontsize=7,
-        )
+def _occurrences(axis: Axes, trial: Trial, S: NDArray[np.float64]) -> None:
+    """Shade each occurrence and print the S given in it."""
+    given = in_occurrences(trial, S[:: (len(S) - 1) // trial.n_bins])
+    places: Any = zip(trial.onsets, trial.classes, given, strict=True)
+    for onset, class_, amount in places:
+        stop = onset + trial.pattern_bins
+        axis.axvspan(onset, stop, color=class_colour(class_), alpha=0.15, linewidth=0)
+        text = f"class {class_ + 1}: $S$ = {amount:.2f}"
+        top = axis.get_ylim()[1]
+        axis.text((onset + stop) / 2, 0.97 * top, text, ha="center", va="top", fontsize=7)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -120,3 +121,33 @@ def test_S_of_a_fine_course_is_that_of_the_neuron() -> None:
 def test_bad_numbers_are_refused(arguments: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Reactor(NETWORK).stochastic(SPIKES, **arguments)
+
+
+def full_size(bins: int = 250) -> tuple[Reactor, InputSpikes]:
+    """100 channels with weights as training leaves them, and a trial of that many bins."""
+    rng = np.random.default_rng(0)
+    times, channels = np.nonzero(rng.random((bins, 100)) < 0.005)
+    spikes = InputSpikes(times.astype(float), channels, float(bins), 100)
+    return Reactor(ReactionNetwork(0.3 * rng.random(100), alpha=0.2)), spikes
+
+
+@pytest.mark.slow
+def test_a_hundred_runs_of_500_molecules_take_half_a_minute_at_most() -> None:
+    reactor, spikes = full_size()
+    began = time.process_time()
+    reactor.stochastic(spikes, 500, 100)
+    assert time.process_time() - began < 30.0
+
+
+@pytest.mark.slow
+def test_the_mean_of_a_thousand_full_runs_is_the_deterministic_solution() -> None:
+    """At full size, 25 molecules. Of 250 bins, which are far from independent, 98 % at least lie
+    within three standard errors (99.7 % are expected), and so does the average over time."""
+    reactor, spikes = full_size()
+    course = reactor.stochastic(spikes, 25, 1_000, seed=1, points_per_bin=1)
+    expected = reactor.deterministic(spikes, 1).V
+    error = course.V.std(0, ddof=1) / np.sqrt(1_000)
+    within = np.abs(course.V.mean(0) - expected) <= 3.0 * error
+    assert within.mean() >= 0.98
+    average = course.V.mean(1)
+    assert abs(average.mean() - expected.mean()) <= 3.0 * average.std(ddof=1) / np.sqrt(1_000)

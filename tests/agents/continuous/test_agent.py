@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import gymnasium as gym
@@ -279,3 +280,15 @@ def test_two_classes_come_to_give_one_and_two() -> None:
         within.append([np.median(np.abs(S - c - 1)) for c, S in enumerate(in_trials)])
     assert np.median(alone, axis=0).max() <= 0.15
     assert np.median(within, axis=0).max() <= 0.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", RULES, ids=["all", "et", "et modulated"])
+def test_sixty_thousand_trials_take_a_second_at_most(rule: Rule) -> None:
+    task = Task(n_classes=2)
+    patterns = Patterns.draw(task, 0)
+    train_many([ContinuousAgent(ContinuousGNM(), rule, 100)], task, patterns, 1, 0, threads=1)
+    agent = ContinuousAgent(ContinuousGNM(), rule, 100)
+    began = time.process_time()
+    train_many([agent], task, patterns, 60_000, 0, threads=1)
+    assert time.process_time() - began < 1.0
