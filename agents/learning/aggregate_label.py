@@ -81,12 +81,32 @@ def nth_largest(values: NDArray[np.float64], n: int, lanes: Any) -> Any:
 
 @compiled
 def _selected(values: NDArray[np.float64], n: int, lanes: Any) -> Any:
-    """`nth_largest` in O(N) whatever n, a lane after the other."""
+    """`nth_largest` in O(N) whatever n, a lane after the other: Hoare's selection."""
     bar = np.empty((1, values.shape[1]))
+    rest = np.empty(len(values))
     for lane in range(values.shape[1]):
-        bar[0, lane] = np.partition(values[:, lane].copy(), len(values) - 1 - n)[
-            len(values) - 1 - n
-        ]
+        for i in range(len(values)):
+            rest[i] = values[i, lane]
+        low, high = 0, len(values) - 1
+        while low < high:
+            pivot = rest[(low + high) // 2]
+            i, j = low, high
+            while i <= j:
+                while rest[i] > pivot:
+                    i += 1
+                while pivot > rest[j]:
+                    j -= 1
+                if i <= j:
+                    rest[i], rest[j] = rest[j], rest[i]
+                    i += 1
+                    j -= 1
+            if n <= j:
+                high = j
+            elif n >= i:
+                low = i
+            else:
+                break
+        bar[0, lane] = rest[n]
     return load(bar, 0, lanes)
 
 
