@@ -12,11 +12,12 @@ from typing import Any
 def run(main: Callable[[], dict[str, Any]], *, as_json: bool, name: str) -> None:
     """Run `main` and end the process. With `as_json` the result is the last line of stdout.
 
-    Bad input, a full disk and the like end with exit code 2 and one line; Ctrl-C with 130.
+    Bad input, a full disk, a missing package and the like end with exit code 2 and one line;
+    Ctrl-C with 130.
     """
     try:
         result = main()
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, ImportError) as error:
         print(f"{name}: {error}", file=sys.stderr)
         _leave(2)
     except KeyboardInterrupt:

@@ -77,8 +77,10 @@ class Progress:
     def line(self) -> str:
         """Blocks done, rate and time left."""
         rate = self._new / max(self.seconds, 1e-9)
-        left = f"{duration((self.total - self.done) / rate)} left" if rate else "no rate yet"
-        return f"{self.name}: {self.done}/{self.total} blocks, {60 * rate:.1f} blocks/min, {left}"
+        done = f"{self.name}: {self.done}/{self.total} blocks"
+        if not rate:
+            return f"{done}, {duration(self.seconds)} so far"
+        return f"{done}, {60 * rate:.1f}/min, {duration((self.total - self.done) / rate)} left"
 
     def _say(self, text: str) -> None:
         print(text, file=self._stream, flush=True)

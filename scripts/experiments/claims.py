@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
-from experiments import hysteresis, map_claims, method_claims
+from experiments import continuous, hysteresis, map_claims, method_claims, reactions
 
-CLAIMS = (*hysteresis.CLAIMS, *map_claims.CLAIMS, *method_claims.CLAIMS)
+CLAIMS = (
+    *hysteresis.CLAIMS,
+    *continuous.CLAIMS,
+    *map_claims.CLAIMS,
+    *method_claims.CLAIMS,
+    *reactions.CLAIMS,
+)

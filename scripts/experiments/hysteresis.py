@@ -77,8 +77,11 @@ def _judge_potential(results: Results) -> Finding:
     return Finding(
         calm and reset,
         {},
-        f"sub-threshold: rises to {below[-1]:.3f}; super-threshold: peak {peak:.3f}, "
-        f"falls to {trough:.3f} after it (no uncertainty: nothing is drawn)",
+        (
+            f"sub-threshold: rises to {below[-1]:.3f}",
+            f"super-threshold: peak {peak:.3f}, falls to {trough:.3f} after it",
+            "no uncertainty: nothing is drawn",
+        ),
     )
 
 
@@ -87,7 +90,7 @@ def _judge_hysteresis(results: Results) -> Finding:
     return Finding(
         area >= LOOP,
         {},
-        f"the loop fills {area:.0%} of the box around it (no uncertainty: nothing is drawn)",
+        (f"the loop fills {area:.0%} of the box around it", "no uncertainty: nothing is drawn"),
     )
 
 

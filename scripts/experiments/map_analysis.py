@@ -6,15 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from experiments.statistics import score
 
 LARGEST_ETA = 0.6
-"""The optimal line and the residuals are looked at up to this η, as in the paper."""
+"""Residuals are looked at up to this η, as in the paper."""
 
-LINES = np.arange(0.02, 0.401, 0.005)
-"""Candidates for α*: at the largest η, α*/(1−η) is still at most 1."""
+LINES = np.arange(0.05, 0.501, 0.005)
+"""Candidates for α*; each line runs from (η = 0, α = α*) to α = 1."""
+
+_POINTS = 60
+"""Points at which a line is looked up, evenly spaced in α."""
 
 
 class Cell(NamedTuple):
@@ -26,10 +29,11 @@ class Cell(NamedTuple):
 
 
 class Line(NamedTuple):
-    """The best line (1−η)α = α*, and the mean score along it."""
+    """The best line (1−η)α = α*, the mean score along it, and that at η = 0 for the same α."""
 
     alpha: float
     score: float
+    uncorrected: float
 
 
 def best(scores: xr.DataArray) -> Cell:
@@ -39,26 +43,14 @@ def best(scores: xr.DataArray) -> Cell:
 
 
 def optimal_line(scores: xr.DataArray) -> Line:
-    """The α* whose line (1−η)α = α* has the highest mean score over η up to `LARGEST_ETA`."""
-    etas, rows, alphas = _rows(scores)
-    return _highest(
-        LINES,
-        [
-            np.mean(
-                [np.interp(a / (1 - eta), alphas, row) for eta, row in zip(etas, rows, strict=True)]
-            )
-            for a in LINES
-        ],
-    )
-
-
-def optimal_constant(scores: xr.DataArray) -> Line:
-    """The α with the highest mean score over the same η: what the line has to beat."""
-    _, rows, alphas = _rows(scores)
-    candidates = np.union1d(LINES, alphas)
-    return _highest(
-        candidates, [np.mean([np.interp(a, alphas, r) for r in rows]) for a in candidates]
-    )
+    """The line (1−η)α = α* with the highest mean score from α = α* to α = 1."""
+    plane = scores.transpose("eta", "alpha")
+    look_up = RegularGridInterpolator((plane["eta"], plane["alpha"]), plane.to_numpy())
+    alphas = np.linspace(LINES, 1.0, _POINTS)
+    along = look_up(np.stack([1 - LINES / alphas, alphas], axis=-1)).mean(axis=0)
+    place = int(along.argmax())
+    column = np.stack([np.zeros(_POINTS), alphas[:, place]], axis=-1)
+    return Line(float(LINES[place]), float(along[place]), float(look_up(column).mean()))
 
 
 def residuals(results: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
@@ -68,19 +60,9 @@ def residuals(results: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """
     scores = score(results)
     error = results["survived"].std("run", ddof=1) / np.sqrt(results.sizes["run"])
-    place = scores.argmax("alpha")
-    top, top_error = scores.isel(alpha=place), error.isel(alpha=place)
+    top = scores.max("alpha")
+    top_error = error.isel(alpha=scores.argmax("alpha")).drop_vars("alpha")
+    residual = top - top.sel(eta=0.0)
+    spread = np.hypot(top_error, top_error.sel(eta=0.0))
     apart = {"eta": (scores["eta"] > 0) & (scores["eta"] <= LARGEST_ETA)}
-    residual = top - top.sel(eta=0.0, drop=True)
-    spread = np.hypot(top_error, top_error.sel(eta=0.0, drop=True))
-    return residual.isel(apart).drop_vars("alpha"), spread.isel(apart).drop_vars("alpha")
-
-
-def _rows(scores: xr.DataArray) -> tuple[NDArray[np.float64], ...]:
-    low = scores.sel(eta=scores["eta"] <= LARGEST_ETA).transpose("eta", "alpha")
-    return low["eta"].to_numpy(), low.to_numpy(), low["alpha"].to_numpy()
-
-
-def _highest(candidates: NDArray[np.float64], means: list[np.floating]) -> Line:
-    place = int(np.argmax(means))
-    return Line(float(candidates[place]), float(means[place]))
+    return residual.isel(apart), spread.isel(apart)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from experiments.map_analysis import best, optimal_constant, optimal_line, residuals
+from experiments.map_analysis import best, optimal_line, residuals
 from experiments.statistics import Interval, bootstrap, by_seed, mean, score
 from experiments.verdict import Claim, Finding, Results
 from gnm_env import Task
@@ -57,8 +57,8 @@ def _judge_edges(results: Results) -> Finding:
     for start in _MAPS:
         corner, spiky = _edges(_one_class(results, start))
         held[start] = _below(corner, FAILURE) and _below(spiky, FAILURE)
-        words.append(f"{start}: α, η ≤ 0.05 {corner:,.0f}; η ≥ 0.975 {spiky:,.0f}")
-    return Finding(all(held.values()), _per_start(held), "; ".join(words) + " bins")
+        words.append(f"{start}: α, η ≤ 0.05 {corner:,.0f}; η ≥ 0.975 {spiky:,.0f} bins")
+    return Finding(all(held.values()), _per_start(held), tuple(words))
 
 
 def _below(interval: Interval, bound: float) -> bool:
@@ -97,7 +97,7 @@ def _judge_rise(results: Results) -> Finding:
         and not strict[start]
         for start in _MAPS
     }
-    return Finding(all(strict.values()), conditions, "; ".join(words))
+    return Finding(all(strict.values()), conditions, tuple(words))
 
 
 # --- F3c: the best cell --------------------------------------------------------------------------
@@ -116,28 +116,28 @@ def _judge_best(results: Results) -> Finding:
         plateau[start] = falls and share >= 0.95
         words.append(
             f"{start}: best cell η = {top.eta:g}, α = {top.alpha:g} with {top.score:,.0f} bins; "
-            f"(0, 0.3) has {share:.0%} of it; from α = 0.3 to 1 it falls by {fall:,.0f}"
+            f"(0, 0.3) has {share:.0%} of it; fall from α = 0.3 to 1: {fall:,.0f}"
         )
     conditions = _per_start(strict) | {
         f"“best” means within 5 % of the best cell ({start} initial weights)": plateau[start]
         and not strict[start]
         for start in _MAPS
     }
-    return Finding(all(strict.values()), conditions, "; ".join(words))
+    return Finding(all(strict.values()), conditions, tuple(words))
 
 
 # --- F3d: the optimal line -----------------------------------------------------------------------
 
 
 def _line_gain(scores: xr.DataArray) -> tuple[float, Interval]:
-    """α*, and by how much the best line (1−η)α = α* beats the best constant α, in bins."""
+    """α*, and how many bins the best line gains over η = 0 at the same values of α."""
     template = scores.transpose("pattern_seed", "eta", "alpha")
 
     def gain(sample: np.ndarray) -> float:
-        average = _average(template.copy(data=sample))
-        return optimal_line(average).score - optimal_constant(average).score
+        # As many seeds are drawn as there are, so that every sample has the template's shape.
+        line = optimal_line(_average(template.copy(data=sample)))
+        return line.score - line.uncorrected
 
-    # As many seeds are drawn as there are, so that every sample has the template's shape.
     return optimal_line(_average(scores)).alpha, bootstrap(gain, template.to_numpy(), resamples=500)
 
 
@@ -152,13 +152,12 @@ def _judge_line(results: Results) -> Finding:
     found = {name: _line_gain(scores) for name, scores in maps.items()}
     held = {name: _above(gain, 0.0) for name, (_, gain) in found.items()}
     words = [
-        f"{name}: α* = {alpha:.3f}, {gain:,.0f} bins more along the line than at the best "
-        "constant α"
+        f"{name}: α* = {alpha:.3f}, gain along the line {gain:+,.0f} bins"
         for name, (alpha, gain) in found.items()
     ]
     one = held["one class"] and held["one class, published initial weights"]
     conditions = {f"the task has {name}": holds for name, holds in held.items()}
-    return Finding(one, conditions, "; ".join(words))
+    return Finding(one, conditions, tuple(words))
 
 
 # --- F3e: the MST's mark -------------------------------------------------------------------------
@@ -171,13 +170,13 @@ def _judge_mst(results: Results) -> Finding:
         for cap in (10_000, 1_000):
             value = mean(by_seed(score(table.sel(learner=row), cap)))
             held[start, cap] = MST_PAPER / 2 <= value.value <= MST_PAPER * 2
-            words.append(f"{start}, cap {cap:,}: {value:,.0f}")
+            words.append(f"{start}, cap {cap:,}: {value:,.0f} bins")
     conditions = {
         f"the initial weights are the {start} ones and the cap is {cap:,}": holds
         for (start, cap), holds in held.items()
     }
     holds = held["matched", 10_000] and held["published", 10_000]
-    return Finding(holds, conditions, "; ".join(words) + " bins")
+    return Finding(holds, conditions, tuple(words))
 
 
 # --- F4: more classes ----------------------------------------------------------------------------
@@ -194,7 +193,7 @@ def _judge_classes(results: Results) -> Finding:
     return Finding(
         falls and 100 <= interval.value <= 400,
         {},
-        f"{number} bins for 1, 2, 3, 4 classes; at four {interval:,.0f}",
+        (f"{number} bins for 1, 2, 3, 4 classes", f"at four: {interval:,.0f}"),
     )
 
 
@@ -217,7 +216,7 @@ def _judge_eta_zero(results: Results) -> Finding:
     return Finding(
         all(held.values()),
         {f"the task has {c} classes": holds for c, holds in held.items()},
-        "best at η = 0 as a share of the best at any η: " + ", ".join(words),
+        ("best at η = 0 as a share of the best at any η: " + ", ".join(words),),
     )
 
 
@@ -231,17 +230,17 @@ def _judge_residuals(results: Results) -> Finding:
     on_average = residual.median("eta") > 0
     runs = int(residual.sizes["pattern_seed"])
     under = float((residual < 0).mean())
-    number = (
+    numbers = (
         f"{int(clearly.sum())} of {runs} runs have an η > 0 that is ahead by more than "
-        f"{AHEAD_SIGMAS:g} standard errors; in {int(on_average.sum())} the median residual over "
-        "η is "
-        f"positive; {under:.0%} of all points lie below 0"
+        f"{AHEAD_SIGMAS:g} standard errors",
+        f"in {int(on_average.sum())} the median residual over η is positive",
+        f"{under:.0%} of all points lie below 0",
     )
     limit = 0.2 * runs
     return Finding(
         int(clearly.sum()) <= limit,
         {"“ahead” means ahead at the median η": int(on_average.sum()) <= limit},
-        number,
+        numbers,
     )
 
 
@@ -289,10 +288,11 @@ CLAIMS = (
         "Fig. 3b",
         "An optimal line (1−η)α = α*",
         _MAP_PROTOCOL + "; two and three classes as well",
-        "reproduced if, for one class and from both starts, the mean over η ≤ 0.6 along the "
-        "best line "
-        "(1−η)α = α* exceeds that at the best constant α, with an interval above 0 (bootstrap over "
-        "seeds of both optimisations); conditional on the number of classes",
+        "reproduced if, for one class and from both starts, the mean from α = α* to 1 along "
+        "the best "
+        "line (1−η)α = α* exceeds that at η = 0 for the same α, with an interval above 0 "
+        "(bootstrap "
+        "over seeds, α* estimated anew each time); conditional on the number of classes",
         ("F3", "F3-published", "F4"),
         "gnm/PatternStream-v0, 1 to 3 classes",
         _judge_line,

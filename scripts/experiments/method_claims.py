@@ -68,7 +68,7 @@ def _judge_one_class(results: Results) -> Finding:
             _ratio_words(start, lif, gnm, slope)
             + f", all in {values.min():.2f} … {values.max():.2f}"
         )
-    return Finding(all(held.values()), held, "; ".join(words))
+    return Finding(all(held.values()), held, tuple(words))
 
 
 def _judge_three_classes(results: Results) -> Finding:
@@ -78,7 +78,7 @@ def _judge_three_classes(results: Results) -> Finding:
         slope = bootstrap(_slope, lif, gnm)
         held[_condition(start)] = _ratio_at(0, lif, gnm).high < 1 and slope.high < 0
         words.append(_ratio_words(start, lif, gnm, slope))
-    return Finding(all(held.values()), held, "; ".join(words))
+    return Finding(all(held.values()), held, tuple(words))
 
 
 # --- F7: rules and neurons on two classes --------------------------------------------------------
@@ -95,7 +95,7 @@ def _judge_mst(results: Results) -> Finding:
         found = wins(*(paired(results["F7"], start, m) for m in ("MST, ALL", "GNM, ALL")))
         held[_condition(start)] = found.share <= 0.16 and found.p < ALPHA
         words.append(f"{start}: MST ahead of GNM in {found}")
-    return Finding(all(held.values()), held, "; ".join(words))
+    return Finding(all(held.values()), held, tuple(words))
 
 
 ET_FORMS = {"GNM, ET": "plain ET", "GNM, ET modulated": "modulated ET"}
@@ -109,7 +109,7 @@ def _judge_error_trace(results: Results) -> Finding:
             held[name, start] = found.share >= 0.8 and found.p < ALPHA
             words.append(f"{start}: {name} ahead of ALL in {found}")
     return Finding(
-        all(held["plain ET", start] for start in STARTS), _et_conditions(held), "; ".join(words)
+        all(held["plain ET", start] for start in STARTS), _et_conditions(held), tuple(words)
     )
 
 
@@ -129,7 +129,7 @@ def _judge_back_propagation(results: Results) -> Finding:
             gain = mean(bp - et)
             held[name, start] = not gain.low > 0
             words.append(f"{start} {name}: BP − ET {gain:+,.0f}, BP ahead in {wins(bp, et)}")
-    return Finding(all(held.values()), _et_conditions(held), "; ".join(words))
+    return Finding(all(held.values()), _et_conditions(held), tuple(words))
 
 
 _F6_PROTOCOL = (

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from experiments import hysteresis, maps, methods
+from experiments import continuous, hysteresis, maps, methods, reactions
 from experiments.design import Experiment
 
 SIZES = ("quick", "paper")
 
 BUILDERS: dict[str, Callable[[str, tuple[int, ...] | None], Experiment]] = {
     "F1": hysteresis.constant_input,
+    "F2": continuous.two_classes,
     "F3": maps.one_class,
     "F3-published": maps.one_class_published,
     "F4": maps.more_classes,
     "F6": methods.refractory,
     "F7": methods.comparison,
     "BP": methods.back_propagation,
+    "F8": reactions.volumes,
     "table": methods.table,
 }
 NAMES = tuple(BUILDERS)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
+
+from agents import bootstrap_interval
 
 RESAMPLES = 2_000
 
@@ -63,31 +65,28 @@ def by_seed(values: xr.DataArray) -> NDArray[np.float64]:
 
 
 def bootstrap(
-    statistic: Callable[..., float], *samples: ArrayLike, resamples: int = RESAMPLES
+    statistic: Callable[..., Any], *samples: ArrayLike, resamples: int = RESAMPLES
 ) -> Interval:
     """`statistic` of samples that share their first axis, with its percentile bootstrap interval.
 
     The entries along that axis are drawn again together, so that pairs stay pairs.
     """
     arrays = [np.asarray(sample) for sample in samples]
-    seeds = np.arange(len(arrays[0]))
+    n = len(arrays[0])
     value = float(statistic(*arrays))
-    if len(seeds) < 2:
+    if n < 2:
         return Interval(value, math.nan, math.nan)
-    interval = stats.bootstrap(
-        (seeds,),
-        lambda drawn: statistic(*(array[drawn] for array in arrays)),
-        n_resamples=resamples,
-        vectorized=False,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return Interval(value, float(interval.low), float(interval.high))
+    draws = np.random.default_rng(0).integers(0, n, (resamples, n))
+    again = [statistic(*(array[draw] for array in arrays)) for draw in draws]
+    low, high = np.percentile(again, (2.5, 97.5))
+    return Interval(value, float(low), float(high))
 
 
 def mean(sample: ArrayLike) -> Interval:
     """The mean with its interval."""
-    return bootstrap(np.mean, sample)
+    values = np.asarray(sample)
+    ends = bootstrap_interval(values) if len(values) > 1 else (math.nan, math.nan)
+    return Interval(float(values.mean()), *ends)
 
 
 def median(sample: ArrayLike) -> Interval:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -75,7 +75,7 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
 
 def make_agent(setting: Setting, task: Task) -> Any:
     """The untrained agent that a setting describes; ValueError for a key that nothing takes."""
-    kinds = _kinds(setting["neuron"], setting["rule"])
+    kinds = neuron_type(setting["neuron"]), rule_type(setting["rule"])
     taken = {field.name for kind in kinds for field in fields(kind)}
     unknown = sorted(set(setting) - taken - set(_PLACE))
     if unknown:
@@ -99,13 +99,26 @@ def make_agent(setting: Setting, task: Task) -> Any:
     )
 
 
-def _kinds(neuron: str, rule: str) -> tuple[Any, Any]:
-    """The classes that hold a neuron's and a rule's parameters."""
-    if neuron == "network":
-        from agents.network import BackPropagation, Network
+def neuron_type(kind: str) -> Any:
+    """The class that holds the parameters of a kind of neuron."""
+    if kind == "continuous":
+        from agents.continuous import ContinuousGNM
 
-        return Network, BackPropagation
-    return NEURONS[neuron], RULES[rule]
+        return ContinuousGNM
+    if kind == "network":
+        from agents.network import Network
+
+        return Network
+    return NEURONS[kind]
+
+
+def rule_type(rule: str) -> Any:
+    """The class that holds the parameters of a learning rule."""
+    if rule == "bp":
+        from agents.network import BackPropagation
+
+        return BackPropagation
+    return RULES[rule]
 
 
 def training(
@@ -127,8 +140,8 @@ def training(
         train_and_score,
         variables,
         lengths,
-        _protocol(task, axes, common),
-        _seeds(axes),
+        protocol(task, [common, *(setting for axis in axes for setting in axis.settings)]),
+        stream_seeds(axes),
     )
 
 
@@ -151,24 +164,24 @@ def learners(rows: Mapping[str, Mapping[str, Any]]) -> Axis:
     return Axis("learner", names, chunk=0, settings=settings, long_name="neuron and learning rule")
 
 
-def _protocol(task: Task, axes: tuple[Axis, ...], common: Mapping[str, Any]) -> dict[str, Any]:
-    """Every default that the settings leave out, and how seeds become streams."""
-    sets = [common, *(setting for axis in axes for setting in axis.settings)]
-    neurons = {setting["neuron"] for setting in sets if "neuron" in setting}
-    rules = {setting["rule"] for setting in sets if "rule" in setting}
-    single = sorted(neurons & set(NEURONS))
+def protocol(task: Task, sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Every default that the settings `sets` leave out, and how seeds become streams."""
+    neurons = sorted({setting["neuron"] for setting in sets if "neuron" in setting})
+    rules = sorted({setting["rule"] for setting in sets if "rule" in setting})
+    types = {kind: neuron_type(kind) for kind in neurons} | {
+        rule: rule_type(rule) for rule in rules
+    }
     world = {k: v for k, v in asdict(task).items() if k not in ("n_classes", "targets")}
-    defaults = {kind: asdict(NEURONS[kind]()) for kind in single}  # type: ignore[call-overload]
-    defaults |= {rule: asdict(RULES[rule]()) for rule in sorted(rules & set(RULES))}  # type: ignore[call-overload]
-    if "network" in neurons:
-        network, rule = _kinds("network", "bp")
-        defaults |= {"network": asdict(network()), "bp": asdict(rule())}
     return {
         "task": {**world, "targets": "1, 2, … classes"},
-        "defaults": defaults,
+        "defaults": {name: asdict(kind()) for name, kind in types.items()},
         "initial_weight": {
-            "matched": {kind: NEURONS[kind].default_initial_weight for kind in single},
-            "published": {kind: PUBLISHED_START[kind] for kind in single},
+            "matched": {
+                kind: types[kind].default_initial_weight
+                for kind in neurons
+                if hasattr(types[kind], "default_initial_weight")
+            },
+            "published": {kind: w for kind, w in PUBLISHED_START.items() if kind in neurons},
         },
         "seeds": {
             "patterns": "default_rng((pattern_seed, 1))",
@@ -179,7 +192,7 @@ def _protocol(task: Task, axes: tuple[Axis, ...], common: Mapping[str, Any]) -> 
     }
 
 
-def _seeds(axes: tuple[Axis, ...]) -> tuple[Coordinate, ...]:
+def stream_seeds(axes: tuple[Axis, ...]) -> tuple[Coordinate, ...]:
     """The seeds of the streams, for each number of classes and pattern seed."""
     by_name = {axis.name: axis.values for axis in axes}
     dims = ("classes", "pattern_seed")

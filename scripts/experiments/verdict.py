@@ -25,12 +25,12 @@ class Finding:
     Attributes:
         holds: whether the claim holds as it stands, under every protocol that it was tried under.
         conditions: what it holds under, where it does not hold as it stands.
-        number: our number with its interval, in words.
+        numbers: ours with their intervals, in words.
     """
 
     holds: bool
     conditions: Mapping[str, bool]
-    number: str
+    numbers: tuple[str, ...]
 
     @property
     def verdict(self) -> str:

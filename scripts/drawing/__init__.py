@@ -1,0 +1,1 @@
+"""Pictures of results. Nothing here trains; each function reads finished stores."""

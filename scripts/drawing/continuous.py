@@ -1,0 +1,62 @@
+"""Figures 2 and 8: neurons in continuous time, and as chemical reaction networks."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from agents.chemistry.mistakes import MOLECULES, Mistakes
+from agents.chemistry.reactor import POINTS_PER_BIN, Course
+from agents.continuous.outputs import course, pattern_spikes
+from experiments.continuous import untrained
+from experiments.reactions import TRACED, traced_trial, wrong_by_trial
+from experiments.verdict import Results
+from figures_continuous import draw_classes, draw_mistakes, draw_volumes
+from gnm_env import Patterns, Task
+
+SHOWN = 0
+"""The pattern seed whose neuron is shown: the first, whatever it does."""
+
+
+def classes(results: Results) -> Figure:
+    """V and S of one neuron under each of its patterns."""
+    data = results["F2"].isel(classes=0).sel(pattern_seed=SHOWN)
+    task = Task(n_classes=int(data["classes"]))
+    neuron = untrained(data.attrs["settings"]["common"]["alpha"], SHOWN)
+    neuron.weights = data["weights"].to_numpy()
+    patterns = Patterns.draw(task, SHOWN)
+    courses = [course(neuron, pattern_spikes(patterns, c)) for c in range(task.n_classes)]
+    return draw_classes(courses, task.owed, neuron.neuron.theta_r)
+
+
+def volumes(results: Results) -> Figure:
+    """V of one network with few and with many molecules, over the same input."""
+    data = results["F8"].isel(classes=0).sel(pattern_seed=SHOWN)
+    task = Task(n_classes=int(data["classes"]))
+    trial = traced_trial(task, Patterns.draw(task, SHOWN), int(data["evaluation_seed"]))
+    stochastic = {m: _course(data["V"].isel(traced=k)) for k, m in enumerate(TRACED)}
+    return draw_volumes(trial, _course(data["V_deterministic"]), stochastic)
+
+
+def mistakes(results: Results) -> Figure:
+    """Wrong outputs per trial against the number of molecules, over all seeds."""
+    data = results["F8"].isel(classes=0)
+    return draw_mistakes(
+        Mistakes(
+            np.array(MOLECULES),
+            wrong_by_trial(results["F8"]).T,
+            _trials(data["wrong_deterministic"]),
+            _trials(data["wrong_neuron"]),
+        )
+    )
+
+
+def _trials(values: xr.DataArray) -> NDArray[np.int64]:
+    return values.transpose("pattern_seed", "heard").to_numpy().ravel()
+
+
+def _course(V: xr.DataArray) -> Course:
+    values = V.to_numpy()
+    return Course(np.arange(len(values)) / POINTS_PER_BIN, values, theta_r=1.0)
