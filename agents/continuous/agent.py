@@ -25,9 +25,9 @@ class ContinuousAgent(NeuronAgent):
     """A neuron in continuous time; for environments made with output="graded".
 
     What a NeuronAgent is with spikes, this is with amounts: `act` gives the S of one bin, the error
-    is target − S, over each occurrence and over the whole trial, and E(t) = −S(t) in noise. The
-    rules, the standard loop, `train_many`, checkpoints and scores are the same. The trace decays by
-    e^−(1−η)α a bin, and V(t) is the value right after a bin's input.
+    is target − S, over each occurrence and over the whole trial; in noise E(t) is −1 in every bin
+    that gives any output. The trace decays by e^−(1−η)α a bin, and V(t) is the value right after a
+    bin's input. The rules, the standard loop, `train_many`, checkpoints and scores are the same.
 
     Args:
         neuron: a ContinuousGNM.

@@ -1,9 +1,9 @@
 """The compiled loops of a continuous neuron in bins: each bin's input arrives at its beginning.
 
 They take the place of those in `agents.kernels` that count spikes; the loops that only drive these,
-and the learning step, are the ones from there. One neuron at a time (WIDTH 1). The log of a trial
-has the amount of output in each bin where that of spiking neurons has whether they are above
-threshold, so that in noise the error trace is E(t) = 0 − S(t), as over a pattern it is target − S.
+and the learning step, are the ones from there. One neuron at a time (WIDTH 1). V is above the
+threshold, as the log of a trial has it, in the bins that give any output; the standard loop and
+`answer` note the amount itself there.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ from gnm_env.task import World
 
 # Bound by `_continuous_kernels`.
 step: Any = None
-run_bins: Any = None
 run_trial: Any = None
+AMOUNTS = False
+"""Whether the log is to have the amount of output of each bin, instead of 1 where there is any."""
 
 
 class Parameters(NamedTuple):
@@ -114,15 +115,18 @@ def _respond(p: Parameters, state: State, V: float, end: Between) -> tuple[State
 def run_bins_template(
     p: Any, mode: Any, state: Any, weights: Block, heard: Heard, start: int, stop: int, log: Log
 ) -> tuple[Any, float, float]:
-    """Bins start … stop − 1: the new state, and twice the amount of output (see Log and blame)."""
+    """Bins start … stop − 1: the new state, the amount of output, and the bins that gave any."""
     S = 0.0
+    bins_above = 0.0
     for t in range(start, stop):
         drive = drive_at(weights, heard.channels, heard.offsets, t, 0.0)
         state, response = step(p, mode, state, drive)
         store(log.V, t, response.V)
-        store(log.above, t, response.S)
+        above = 1.0 if response.S > 0.0 else 0.0
+        store(log.above, t, response.S if AMOUNTS else above)
         S += response.S
-    return state, S, S
+        bins_above += above
+    return state, S, bins_above
 
 
 @compiled
@@ -300,26 +304,34 @@ def _continuous_kernels(name: str, step: Any, rule: type[Rule], study: Any) -> A
         "weight_change": rule.weight_change,
     }
     together = f"{name}_{rule.name}"
-    bins = specialise(run_bins_template, name, step=step)
-    trial = specialise(run_trial_template, name, run_bins=bins, **of_neuron)
+    trial, noting_trial = (
+        specialise(
+            run_trial_template,
+            f"{name}{suffix}",
+            run_bins=specialise(run_bins_template, f"{name}{suffix}", step=step, AMOUNTS=amounts),
+            **of_neuron,
+        )
+        for suffix, amounts in (("", False), ("_amounts", True))
+    )
     eligibility = specialise(sum_eligibility_template, together, **of_rule)
     learn = specialise(learn_trial_template, together, **of_rule, sum_eligibility=eligibility)
-    # The log holds amounts whatever the rule: it needs the room that rules with an error ask for.
+    # The log is kept whatever the rule: it needs the room that rules with an error ask for.
     all_ = {**of_neuron, **of_rule, "USES_ERROR": True, "run_trial": trial, "learn_trial": learn}
 
     def study_amounts(
         mode: Any, parameters: Block, sign: float, heard: Heard, label: int, log: Log, *rest: Any
     ) -> bool:
-        """The learning step of the standard loop: amounts in place of spikes."""
+        """The learning step of the standard loop: amounts, noted by `hear`, in place of spikes."""
         _, weights, previous = rest
-        amounts = log.above[:, 0]
+        amounts = log.above[:, 0].copy()
+        log.above[:] = log.above > 0.0
         taken: bool = study(mode, parameters, sign, heard, label, log, amounts, weights, previous)
         return taken
 
     return SimpleNamespace(
         train=specialise(train_template, together, **all_),
         study=study_amounts,
-        answer=specialise(answer_template, name, run_trial=trial),
+        answer=specialise(answer_template, name, run_trial=noting_trial),
         survive=specialise(survive_template, name, step=step),
         hear=specialise(hear_template, name, step=step),
         foresee=specialise(foresee_template, name, step=step),

@@ -88,13 +88,15 @@ def test_amounts_handed_out_bin_by_bin_are_those_of_the_whole_course(eta: float)
 
 
 def test_error_trace_learning_follows_its_equation() -> None:
-    """Δ_i = λ Σ_t x_i(t) E(t): x decays by e^−α, E = target − S in patterns, −S(t) in noise."""
+    """Δ_i = λ Σ_t x_i(t) E(t): x decays by e^−α; E is target − S over a pattern, and in noise −1 in
+    every bin with V above the threshold."""
     rate, alpha = 1e-3, 0.3
     agent = make(ErrorTrace(learning_rate=rate), alpha=alpha)
     before = agent.weights.copy()
     trial = draw_trial(TASK, PATTERNS, np.random.default_rng(7))
     S = at_edges(agent, trial)
-    E = -np.diff(S)
+    E = -(np.diff(S) > 0.0).astype(float)
+    assert E.any()
     for k, onset in enumerate(trial.onsets):
         E[onset : onset + trial.pattern_bins] = trial.targets[k] - in_occurrences(trial, S)[k]
     x = np.zeros((trial.n_bins, TASK.n_inputs))
