@@ -36,3 +36,24 @@ def respond(neuron: Neuron, raster: NDArray[np.bool_], weights: ArrayLike) -> Re
     agent = NeuronAgent(neuron, AggregateLabel(fraction=1.0), n_inputs, weight_bounds=None)
     agent.weights = weights
     return record(agent, Trial.from_dense(raster, [], [], Task(n_inputs=n_inputs)))
+
+
+def play(agent: Any, trial: Trial, **altered: Any) -> NDArray[np.bool_]:
+    """One trial of the standard loop, learning at its end; the spikes that the agent gave.
+
+    `altered` replaces entries of the terminal info, or `reward` and `sign_only`.
+    """
+    agent.begin_trial()
+    spikes = np.array([agent.act(row) for row in trial.dense().view(np.int8)]) == 1
+    info = {
+        "label": trial.label,
+        "emitted": int(spikes.sum()),
+        "onsets": trial.onsets.tolist(),
+        "classes": trial.classes.tolist(),
+        "targets": trial.targets.tolist(),
+        "pattern_bins": trial.pattern_bins,
+    }
+    reward = altered.pop("reward", -abs(trial.label - info["emitted"]))
+    sign_only = altered.pop("sign_only", False)
+    agent.learn(reward, {**info, **altered}, sign_only)
+    return spikes
