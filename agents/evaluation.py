@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.lane_group import Answers
 from agents.many import lane_groups
+from agents.policy import as_agent
 from gnm_env.checks import whole
 from gnm_env.stream_env import MAX_EPISODE_BINS
 from gnm_env.task import Patterns, Task
@@ -34,7 +35,8 @@ def noisy_performance(
     of `reset(seed=seed + k)`.
 
     Args:
-        agent: an agent, or a list of agents.
+        agent: an agent, or anything with Stable-Baselines3's `predict` that hears the bits; or a
+            list of such.
         task, patterns: what they hear.
         runs: number of streams.
         cap: most bins per stream.
@@ -48,7 +50,7 @@ def noisy_performance(
     """
     runs, cap = whole("runs", runs, low=1), whole("cap", cap, low=1)
     seed = whole("seed", seed, low=0)
-    agents = list(agent) if isinstance(agent, Sequence) else [agent]
+    agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     bins = np.empty((len(agents), runs), np.int64)
     if shared:
         units = lane_groups(agents, task, patterns, threads)
@@ -62,19 +64,27 @@ def noisy_performance(
     def fill(unit: int) -> None:
         group, places = units[unit]
         first = seed if shared else seed + places[0] * runs
-        for k in range(runs):
-            bins[places, k] = group.survive(np.random.default_rng(first + k), cap)
+        bins[places] = _survived(group, first, runs, cap)
 
     with ThreadPoolExecutor(threads or len(units)) as pool:
         list(pool.map(fill, range(len(units))))
     return bins if isinstance(agent, Sequence) else bins[0]
 
 
+def _survived(group: Any, first_seed: int, runs: int, cap: int) -> NDArray[np.int64]:
+    """Bins survived on `runs` streams, (agents, runs)."""
+    if hasattr(group, "survive_streams"):  # a policy: all streams side by side
+        together: NDArray[np.int64] = group.survive_streams(first_seed, runs, cap)
+        return together
+    streams = (np.random.default_rng(first_seed + k) for k in range(runs))
+    return np.stack([group.survive(rng, cap) for rng in streams], axis=1)
+
+
 def answers(
     agent: Any | Sequence[Any], task: Task, patterns: Patterns, trials: int = 2_000, seed: int = 0
 ) -> Answers:
     """What an agent, or each agent of a list of one kind, answers to `trials` trials of `seed`."""
-    agents = list(agent) if isinstance(agent, Sequence) else [agent]
+    agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     group = type(agents[0]).lanes(agents, task, patterns)
     result: Answers = group.answer(np.random.default_rng(seed), whole("trials", trials, low=1))
     return result

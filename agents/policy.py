@@ -1,18 +1,26 @@
-"""Score anything that has Stable-Baselines3's `predict` on the streams that score the neurons."""
+"""Anything that has Stable-Baselines3's `predict`, scored as the neurons are scored."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Hashable, Iterator, Sequence
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
+from agents.kernels import MOST_SPIKES
+from agents.lane_group import Answers
 from gnm_env.task import Patterns, Task
-from gnm_env.vector_env import PatternStreamVectorEnv
+from gnm_env.trial import Trial, draw_trial
+
+TRIALS_AT_ONCE = 200
+"""Trials that one `predict` answers side by side."""
 
 
+@runtime_checkable
 class Policy(Protocol):
-    """What answers bins: a neuron agent, an SB3 model, or a class of your own."""
+    """What answers bins: an SB3 model that hears bits, or a class of your own."""
 
     def predict(
         self,
@@ -21,31 +29,116 @@ class Policy(Protocol):
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[Any], Any]:
-        """Actions (n,) for the bins (n, N) of n streams, and the state to hand in with the next.
+        """Actions (n,) for one bin, int8 (n, N), of n streams; and the state to hand in next.
 
-        `episode_start` (n,) says where a stream begins anew; `state` is None in the first call.
+        `state` is None in the first call. `episode_start` (n,) says where a stream begins anew.
         """
 
 
-def survive_streams(
-    policy: Policy, task: Task, patterns: Patterns, runs: int, cap: int, seed: int
-) -> NDArray[np.int64]:
-    """Bins survived before the first mistake, int64 (runs,), at most `cap` each.
+class PolicyAgent:
+    """What makes a policy an agent that can be scored; see `agents.lane_group`."""
 
-    Run k hears the stream of `gnm/PatternStream-v0` after `reset(seed=seed + k)`. The streams run
-    side by side, with one `predict` for a bin of all of them.
-    """
-    streams = PatternStreamVectorEnv(runs, task, patterns)
-    bits, _ = streams.reset(seed=seed)
-    survived, alive = np.zeros(runs, np.int64), np.ones(runs, np.bool_)
-    state, begins = None, np.ones(runs, np.bool_)
-    for _ in range(cap):
-        actions, state = policy.predict(bits, state, begins, True)
-        bits, _, mistaken, _, _ = streams.step(actions)
-        begins = np.zeros(runs, np.bool_)
-        # A stream that is lost goes on, unheeded: the batch keeps its shape, and `state` with it.
-        alive &= ~mistaken
-        survived += alive
-        if not alive.any():
-            break
-    return survived
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[Any], Any]:
+        """See `Policy.predict`."""
+        raise NotImplementedError
+
+    def group_key(self) -> Hashable:
+        """No two policies are answered by one `predict`."""
+        return id(self)
+
+    @classmethod
+    def lanes(cls, agents: Sequence[PolicyAgent], task: Task, patterns: Patterns) -> PolicyLanes:
+        """The one agent."""
+        (agent,) = agents
+        return PolicyLanes(agent, task, patterns)
+
+
+class PolicyLanes:
+    """One policy that hears many streams, or many trials, side by side."""
+
+    def __init__(self, policy: Policy, task: Task, patterns: Patterns) -> None:
+        self._policy = policy
+        self._task, self._patterns = task, patterns
+
+    def survive_streams(self, first_seed: int, runs: int, cap: int) -> NDArray[np.int64]:
+        """Bins survived before the first mistake, (1, runs), at most `cap` each.
+
+        Run k hears the stream of `gnm/PatternStream-v0` after `reset(seed=first_seed + k)`.
+        """
+        from gnm_env.vector_env import PatternStreamVectorEnv  # only who scores policies needs it
+
+        streams = PatternStreamVectorEnv(runs, self._task, self._patterns)
+        bits, _ = streams.reset(seed=first_seed)
+        survived, alive = np.zeros(runs, np.int64), np.ones(runs, np.bool_)
+        state, begins = None, np.ones(runs, np.bool_)
+        for _ in range(cap):
+            actions, state = self._policy.predict(bits, state, begins, True)
+            bits, _, mistaken, _, _ = streams.step(actions)
+            begins = np.zeros(runs, np.bool_)
+            # A stream that is lost goes on, unheeded: the batch keeps its shape, and `state` too.
+            alive &= ~mistaken
+            survived += alive
+            if not alive.any():
+                break
+        return survived[None]
+
+    def answer(self, rng: Generator, trials: int) -> Answers:
+        """Responses to `trials` trials drawn from `rng`."""
+        table = np.zeros((1, self._task.n_classes, MOST_SPIKES + 1), np.int64)
+        false_alarms, wrong, noise_bins = 0, 0, 0
+        for trial, spikes in self._answered(rng, trials):
+            owner = trial.owner()
+            given = np.bincount(owner[spikes] + 1, minlength=len(trial.onsets) + 1)
+            np.add.at(table[0], (trial.classes, np.minimum(given[1:], MOST_SPIKES)), 1)
+            false_alarms += int(given[0])
+            noise_bins += int(np.sum(owner < 0))
+            wrong += int(spikes.sum() != trial.label)
+        return Answers(table, np.array([false_alarms]), noise_bins, np.array([wrong]), trials)
+
+    def _answered(self, rng: Generator, trials: int) -> Iterator[tuple[Trial, NDArray[np.bool_]]]:
+        """Trials with the output spikes in each of their bins, (T,)."""
+        for done in range(0, trials, TRIALS_AT_ONCE):
+            count = min(TRIALS_AT_ONCE, trials - done)
+            drawn = [draw_trial(self._task, self._patterns, rng) for _ in range(count)]
+            # Shorter trials are followed by silence, which nobody counts.
+            raster = np.zeros((max(t.n_bins for t in drawn), count, self._task.n_inputs), np.int8)
+            for k, trial in enumerate(drawn):
+                raster[: trial.n_bins, k] = trial.dense()
+            spikes = self._play(raster)
+            for k, trial in enumerate(drawn):
+                yield trial, spikes[: trial.n_bins, k]
+
+    def _play(self, raster: NDArray[np.int8]) -> NDArray[np.bool_]:
+        """Output spikes (T, n) of n streams (T, n, N)."""
+        n_bins, n, _ = raster.shape
+        spikes = np.zeros((n_bins, n), np.bool_)
+        state, begins = None, np.ones(n, np.bool_)
+        for t in range(n_bins):
+            spikes[t], state = self._policy.predict(raster[t], state, begins, True)
+            begins = np.zeros(n, np.bool_)
+        return spikes
+
+
+class _Bare(PolicyAgent):
+    """A policy that has nothing but `predict`."""
+
+    def __init__(self, policy: Policy) -> None:
+        self.predict = policy.predict  # type: ignore[method-assign]
+
+
+def as_agent(agent: Any) -> Any:
+    """`agent`, or what makes an agent of a policy; ValueError if it is neither."""
+    if hasattr(agent, "group_key"):
+        return agent
+    if isinstance(agent, Policy):
+        return _Bare(agent)
+    raise ValueError(
+        f"an agent must have a method predict(observation, state, episode_start, deterministic), "
+        f"got {type(agent).__name__}"
+    )

@@ -1,0 +1,159 @@
+"""A saved RL agent: SB3's own zip beside what it was trained on, in one folder.
+
+    model.zip         SB3's model as it stands; `PPO.load` and `learn` go on from it
+    best_model.zip    the best by periodic evaluation, if there was one
+    task.json         kind of agent, senses, task, feedback and patterns
+
+SB3's zip holds pickled objects: load only what you trust.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from agents.checkpoint import atomic_write
+from agents.rl.recipes import RECIPES
+from agents.rl.sb3_agent import SB3Agent
+from agents.rl.senses import Senses
+from gnm_env.checks import choice
+from gnm_env.task import Patterns, Task
+
+FORMAT = 1
+DESCRIPTION, MODEL, BEST = "task.json", "model.zip", "best_model.zip"
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a folder says about its agent."""
+
+    kind: str
+    senses: Senses
+    feedback: str
+    task: Task
+    patterns: Patterns
+
+
+def describe(folder: str | os.PathLike[str], description: Description) -> None:
+    """Write task.json, whole or not at all. ValueError if the folder cannot be written."""
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(
+            f"cannot make the folder {place}: {error.strerror}; choose another"
+        ) from None
+    contents = {
+        "format": FORMAT,
+        "kind": description.kind,
+        "senses": asdict(description.senses),
+        "feedback": description.feedback,
+        "task": asdict(description.task),
+        "patterns": np.argwhere(description.patterns.dense()).tolist(),
+    }
+    with atomic_write(place / DESCRIPTION) as file:
+        file.write(json.dumps(contents).encode())
+
+
+def described(folder: str | os.PathLike[str]) -> Description:
+    """What task.json says; ValueError if it is missing or damaged."""
+    path = Path(folder) / DESCRIPTION
+    try:
+        contents = json.loads(path.read_bytes())
+        if contents["format"] != FORMAT:
+            raise ValueError(f"format {contents['format']}, this version reads {FORMAT}")
+        task = Task(**contents["task"])
+        bits = np.zeros((task.n_classes, task.pattern_bins, task.n_inputs), np.bool_)
+        bits[tuple(np.array(contents["patterns"], np.int64).reshape(-1, 3).T)] = True
+        return Description(
+            choice("kind", contents["kind"], tuple(RECIPES)),
+            Senses(**contents["senses"]),
+            contents["feedback"],
+            task,
+            Patterns.from_dense(bits),
+        )
+    except FileNotFoundError:
+        raise ValueError(
+            f"{folder} holds no RL agent, it has no {DESCRIPTION}; "
+            "give the folder that scripts/train_rl.py or agents.rl.save wrote"
+        ) from None
+    except (KeyError, TypeError, ValueError, IndexError, OSError) as error:
+        raise ValueError(
+            f"{path} is not readable ({type(error).__name__}: {error}); train and save again"
+        ) from None
+
+
+def save_model(path: str | os.PathLike[str], model: BaseAlgorithm) -> None:
+    """SB3's `model.save`, whole or not at all."""
+    contents = io.BytesIO()
+    model.save(contents)
+    with atomic_write(path) as file:
+        file.write(contents.getvalue())
+
+
+def save(
+    folder: str | os.PathLike[str],
+    model: BaseAlgorithm,
+    kind: str,
+    task: Task,
+    patterns: Patterns,
+    *,
+    feedback: str = "cost",
+    senses: Senses | None = None,
+) -> None:
+    """Save a model with all that is needed to score it or to go on. `load` reads it.
+
+    Raises ValueError if the folder cannot be written.
+    """
+    senses = RECIPES[kind].senses if senses is None else senses
+    describe(folder, Description(kind, senses, feedback, task, patterns))
+    save_model(Path(folder) / MODEL, model)
+
+
+def load(folder: str | os.PathLike[str]) -> tuple[SB3Agent, Task, Patterns]:
+    """The best agent of a folder, ready to be scored, with its task and patterns.
+
+    That is best_model.zip where there is one, else model.zip. Raises ValueError if a file is
+    missing or damaged, or if they do not belong together.
+    """
+    place = Path(folder)
+    about = described(place)
+    model = load_model(place / BEST if (place / BEST).exists() else place / MODEL, about.kind)
+    return SB3Agent(model, about.task, about.senses), about.task, about.patterns
+
+
+def load_model(path: str | os.PathLike[str], kind: str, **arguments: Any) -> BaseAlgorithm:
+    """The SB3 model in a zip; ValueError if it is missing, damaged or of another algorithm."""
+    algorithm = RECIPES[kind].algorithm
+    try:
+        model: BaseAlgorithm = algorithm.load(path, device="cpu", **arguments)
+    except FileNotFoundError:
+        raise ValueError(f"there is no model {path}; train and save again") from None
+    except (zipfile.BadZipFile, ValueError, KeyError, RuntimeError, EOFError, OSError) as error:
+        raise ValueError(
+            f"{path} is not a readable {algorithm.__name__} model "
+            f"({type(error).__name__}: {error}); train and save again"
+        ) from None
+    return model
+
+
+def same_world(about: Description, task: Task, patterns: Patterns, feedback: str) -> str:
+    """How a saved agent's world differs from the one wanted, in words; empty if it does not."""
+    for field in dataclasses.fields(Task):
+        ours, theirs = getattr(task, field.name), getattr(about.task, field.name)
+        if ours != theirs:
+            return f"{field.name} is {theirs!r} there and {ours!r} here"
+    if about.patterns != patterns:
+        return "its patterns are others (see --pattern-seed)"
+    if about.feedback != feedback:
+        return f"feedback is {about.feedback!r} there and {feedback!r} here"
+    return ""

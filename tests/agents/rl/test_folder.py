@@ -1,0 +1,105 @@
+"""A saved agent: complete, loadable by SB3 itself, refused where it is damaged."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+
+from agents import noisy_performance
+from agents.rl import load, make_rl_agent, save, training_env
+from agents.rl.folder import described, same_world
+from gnm_env import Patterns, Task
+
+TASK = Task(n_classes=2, onset_probability=0.05)
+PATTERNS = Patterns.draw(TASK, 4)
+
+
+@pytest.fixture(scope="module")
+def model():
+    env = training_env(TASK, PATTERNS, n_envs=2)
+    return make_rl_agent("ppo", env, seed=1, spike_probability=0.5)
+
+
+@pytest.fixture
+def folder(tmp_path, model):
+    save(tmp_path / "agent", model, "ppo", TASK, PATTERNS)
+    return tmp_path / "agent"
+
+
+def test_a_saved_agent_comes_back_with_task_and_patterns_and_scores_the_same(folder, model):
+    agent, task, patterns = load(folder)
+    assert task == TASK and patterns == PATTERNS
+    scores = [
+        noisy_performance(a, TASK, PATTERNS, runs=5, seed=9) for a in (agent, load(folder)[0])
+    ]
+    np.testing.assert_array_equal(*scores)
+    shown = np.random.default_rng(0).random((20, TASK.n_inputs + 2)).astype(np.float32)
+    actions = [m.predict(shown, deterministic=True)[0] for m in (agent.policy, model)]
+    np.testing.assert_array_equal(*actions)
+
+
+def test_the_model_is_a_zip_that_stable_baselines_opens(folder):
+    assert isinstance(PPO.load(folder / "model.zip"), PPO)
+
+
+def test_the_best_model_is_preferred_to_the_last(folder, model):
+    best = make_rl_agent("ppo", training_env(TASK, PATTERNS, n_envs=2), seed=7)
+    best.save(folder / "best_model.zip")
+    weights = load(folder)[0].policy.policy.action_net.weight.detach().numpy()
+    np.testing.assert_array_equal(weights, best.policy.action_net.weight.detach().numpy())
+
+
+def test_worlds_that_differ_are_told_apart(folder):
+    about = described(folder)
+    assert same_world(about, TASK, PATTERNS, "cost") == ""
+    assert "n_classes is 2 there and 1 here" in same_world(about, Task(), PATTERNS, "cost")
+    assert "patterns" in same_world(about, TASK, Patterns.draw(TASK, 5), "cost")
+    assert "feedback" in same_world(about, TASK, PATTERNS, "dense")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("task.json", "{", "task.json is not readable"),
+        ("task.json", json.dumps({"format": 99}), "format 99"),
+        ("task.json", json.dumps({"format": 1}), "KeyError"),
+        ("model.zip", "no zip", "not a readable PPO model"),
+    ],
+)
+def test_damaged_files_are_refused_by_name(folder, name, text, message):
+    (folder / name).write_text(text)
+    with pytest.raises(ValueError, match=message):
+        load(folder)
+
+
+def test_missing_files_are_refused_by_name(folder, tmp_path):
+    with pytest.raises(ValueError, match="holds no RL agent"):
+        load(tmp_path)
+    (folder / "model.zip").unlink()
+    with pytest.raises(ValueError, match="there is no model"):
+        load(folder)
+
+
+def test_an_interrupted_save_leaves_the_old_model(folder, model, monkeypatch):
+    before = (folder / "model.zip").read_bytes()
+
+    def fail(file):
+        file.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(model, "save", fail)
+    with pytest.raises(KeyboardInterrupt):
+        save(folder, model, "ppo", TASK, PATTERNS)
+    assert (folder / "model.zip").read_bytes() == before
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, model):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ValueError, match="cannot make the folder"):
+        save(tmp_path / "file" / "agent", model, "ppo", TASK, PATTERNS)

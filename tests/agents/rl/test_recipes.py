@@ -1,0 +1,94 @@
+"""The recipes: a start near silence, SB3's own objects, refusals that say what to do."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+import torch
+from sb3_contrib import RecurrentPPO
+from stable_baselines3 import DQN, PPO
+
+from agents.rl import RECIPES, TRACES, make_rl_agent, training_env
+from gnm_env import Patterns, Task
+
+TASK = Task()
+PATTERNS = Patterns.draw(TASK, 0)
+CLASSES = {"ppo": PPO, "ppo-linear": PPO, "recurrent-ppo": RecurrentPPO, "dqn": DQN}
+
+
+@pytest.mark.parametrize("kind", RECIPES)
+def test_an_agent_is_a_plain_model_of_stable_baselines(kind):
+    model = make_rl_agent(kind, training_env(TASK, PATTERNS, kind, n_envs=2))
+    assert type(model) is CLASSES[kind]
+    assert model.n_envs == 2
+
+
+@pytest.mark.parametrize("kind", ["ppo", "ppo-linear"])
+@pytest.mark.parametrize("probability", [0.01, 0.2])
+def test_a_fresh_policy_spikes_as_rarely_as_asked(kind, probability):
+    env = training_env(TASK, PATTERNS, kind, n_envs=50)
+    model = make_rl_agent(kind, env, spike_probability=probability)
+    observation = torch.as_tensor(env.reset())
+    spikes = model.policy.get_distribution(observation).distribution.probs[:, 1]
+    assert spikes.mean().item() == pytest.approx(probability, rel=0.3)
+
+
+def test_a_fresh_dqn_is_silent():
+    env = training_env(TASK, PATTERNS, "dqn", n_envs=50)
+    model = make_rl_agent("dqn", env)
+    assert not model.predict(env.reset(), deterministic=True)[0].any()
+
+
+def test_equal_seeds_begin_equal_and_settings_override_the_recipe():
+    first, second, other = (
+        make_rl_agent("ppo", training_env(TASK, PATTERNS, n_envs=2), seed, gamma=0.9)
+        for seed in (1, 1, 2)
+    )
+    assert first.gamma == 0.9
+    weights = [model.policy.action_net.weight.detach().numpy() for model in (first, second, other)]
+    np.testing.assert_array_equal(weights[0], weights[1])
+    assert np.any(weights[0] != weights[2])
+
+
+def test_a_single_environment_is_seen_through_traces():
+    model = make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0"))
+    assert model.observation_space == TRACES.wrap(gym.make("gnm/PatternTrial-v0")).observation_space
+    assert model.n_steps == 16_384
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: make_rl_agent("sarsa", gym.make("gnm/PatternTrial-v0")), "kind must be one of"),
+        (lambda: training_env(TASK, PATTERNS, n_envs=0), "n_envs must be >= 1"),
+        (lambda: training_env(TASK, PATTERNS, feedback="loud"), "feedback must be one of"),
+        (lambda: make_rl_agent("ppo", 3), "env must be a Gymnasium Env or an SB3 VecEnv"),
+        (
+            lambda: make_rl_agent(
+                "recurrent-ppo", training_env(TASK, PATTERNS, "ppo", n_envs=2)
+            ),
+            "needs the raw bits",
+        ),
+        (
+            lambda: make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0"), spike_probability=0.0),
+            "spike_probability must be > 0",
+        ),
+        (
+            lambda: make_rl_agent("ppo", gym.make_vec(
+                "gnm/PatternTrial-v0", 2, vectorization_mode="vector_entry_point")),
+            "training_env makes one",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused_with_a_remedy(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_every_recipe_gives_its_reasons():
+    for kind in RECIPES:
+        assert f'- "{kind}": ' in (make_rl_agent.__doc__ or "")
