@@ -63,8 +63,8 @@ def train_many(
         mean_error=np.empty((0, len(agents))),
         overflowed=np.full(len(agents), -1),
     )
-    with ThreadPoolExecutor(max(len(units), 1)) as pool:
-        try:
+    try:
+        with ThreadPoolExecutor(max(len(units), 1)) as pool:
             for start in range(0, trials, block):
                 size = min(block, trials - start)
                 _train_block(units, pool, rng, size, history)
@@ -74,8 +74,10 @@ def train_many(
                         break
                 if np.all(history.overflowed >= 0):
                     break
-        finally:
-            _write_back(units)
+    finally:
+        # After an interrupt too, and then only once every thread has finished its block: before
+        # that, weights are on the move.
+        _write_back(units)
     for k in np.flatnonzero(history.overflowed >= 0):
         warn_of_overflow(f"agent {k}", int(history.overflowed[k]) + 1)
     return history
