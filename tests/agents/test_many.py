@@ -1,0 +1,150 @@
+"""What train_many refuses, and what it leaves behind when it is interrupted."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from agents import GNM, AggregateLabel, NeuronAgent, train, train_many
+from agents.many import lane_groups
+from gnm_env import Patterns, Task
+from tests.agents.worlds import BUSY, BUSY_PATTERNS, trial_env
+
+
+def busy_agent(seed: int = 0) -> NeuronAgent:
+    return NeuronAgent(GNM(), AggregateLabel(1e-3), BUSY.n_inputs, seed, 0.6)
+
+
+@pytest.mark.parametrize("agents", [[], (), None, busy_agent])
+def test_a_list_of_agents_is_needed(agents: Any) -> None:
+    with pytest.raises(ValueError, match="agents must be a list of at least one agent"):
+        train_many(agents, BUSY, BUSY_PATTERNS, 10)
+
+
+def test_an_agent_that_does_not_fit_the_task_is_refused() -> None:
+    agents = [busy_agent(), NeuronAgent(GNM(), AggregateLabel(), 20)]
+    with pytest.raises(ValueError, match=r"n_inputs = 12, got 20"):
+        train_many(agents, BUSY, BUSY_PATTERNS, 10)
+
+
+def test_patterns_that_do_not_fit_the_task_are_refused() -> None:
+    other = Patterns.draw(Task(n_inputs=12), 0)
+    with pytest.raises(ValueError, match=r"patterns must have shape .* = \(2, 8, 12\)"):
+        train_many([busy_agent()], BUSY, other, 10)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"threads": 0}, "threads must be >= 1, got 0"),
+        ({"threads": 1.5}, "threads must be a whole number, got 1.5"),
+        ({"trials": -1}, "trials must be >= 0, got -1"),
+        ({"block": 0}, "block must be >= 1, got 0"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        train_many([busy_agent()], BUSY, BUSY_PATTERNS, **{"trials": 10, **keywords})
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [({"trials": -1}, "trials must be >= 0, got -1"), ({"block": 0}, "block must be >= 1, got 0")],
+)
+def test_the_loop_refuses_numbers_out_of_range_too(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        train(busy_agent(), trial_env(), **{"trials": 10, **keywords})
+
+
+def test_agents_that_would_not_fit_into_memory_are_refused_before_anything_is_allocated() -> None:
+    task = Task(n_inputs=50_000_000, rate=1e-9, pattern_bins=1)
+
+    class Sized(list[Any]):
+        def __len__(self) -> int:
+            return 1_000_000
+
+    with pytest.raises(ValueError, match=r"needs [\d,.]+ GiB, this machine has [\d,.]+"):
+        lane_groups(Sized([None]), task, None, 1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("run", ["loop", "lanes"])
+def test_weights_that_are_not_finite_are_refused_before_they_spread(run: str) -> None:
+    agent = busy_agent()
+    agent.weights[3] = np.nan
+    with pytest.raises(ValueError, match="weights must be finite"):
+        if run == "loop":
+            train(agent, trial_env(), 1, seed=0)
+        else:
+            train_many([agent], BUSY, BUSY_PATTERNS, 1, seed=0)
+
+
+def test_no_trials_change_nothing() -> None:
+    agent = busy_agent()
+    before = agent.weights.copy()
+    history = train_many([agent], BUSY, BUSY_PATTERNS, 0)
+    assert len(history) == 0
+    assert np.array_equal(agent.weights, before)
+
+
+class FakeAgent:
+    """An agent whose lane group notes what is done to it."""
+
+    n_inputs = BUSY.n_inputs
+
+    def __init__(self, name: str, train: Any) -> None:
+        self.name, self.train_ = name, train
+        self.training = threading.Event()
+        self.torn = False
+        self.written = 0
+
+    def group_key(self) -> str:
+        return self.name
+
+    @staticmethod
+    def lanes(agents: Any, task: Task, patterns: Patterns) -> Any:
+        agent = agents[0]
+
+        class Group:
+            def train(self, rng: Any, trials: int) -> Any:
+                agent.training.set()
+                try:
+                    agent.train_()
+                finally:
+                    agent.training.clear()
+                return np.zeros(1, np.int64), np.zeros(1)
+
+            def write_back(self) -> None:
+                agent.torn |= agent.training.is_set()
+                agent.written += 1
+
+            def overflowed(self) -> Any:
+                return np.full(1, -1)
+
+        return Group()
+
+
+def test_an_interrupt_writes_back_what_was_learned_once_every_thread_has_ended_its_block() -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    agents = [FakeAgent("quick", interrupted), FakeAgent("slow", lambda: time.sleep(0.2))]
+    with pytest.raises(KeyboardInterrupt):
+        train_many(agents, BUSY, BUSY_PATTERNS, 10, seed=0)
+    assert [agent.written for agent in agents] == [1, 1]
+    assert not any(agent.torn for agent in agents)
+
+
+def test_an_exception_in_a_callback_keeps_what_was_learned() -> None:
+    agent, expected = busy_agent(), busy_agent()
+
+    def stop(done: int, history: Any) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_many([agent], BUSY, BUSY_PATTERNS, 500, seed=3, callback=stop, block=100)
+    train_many([expected], BUSY, BUSY_PATTERNS, 100, seed=3)
+    assert np.array_equal(agent.weights, expected.weights)
