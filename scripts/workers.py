@@ -8,13 +8,15 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
-import experiments
 from experiments.design import Block
 
 CONNECTION_SECONDS = 5
@@ -50,8 +52,8 @@ def threads(count: int | None = None) -> Iterator[Executor]:
 def cluster(address: str) -> Iterator[Executor]:
     """The Dask cluster whose scheduler listens at `address`, such as "tcp://node1:8786".
 
-    Its workers need the packages `gnm_env` and `agents`; what a block is travels with it. A worker
-    that dies costs the block it was at: the scheduler gives that block to another worker.
+    Its workers need the packages `gnm_env` and `agents`, of the same version. A worker that dies
+    costs the block it was at: the scheduler gives that block to another worker.
 
     Raises ValueError if Dask is not installed, or if no scheduler answers.
     """
@@ -63,15 +65,22 @@ def cluster(address: str) -> Iterator[Executor]:
             "--scheduler needs Dask, which is not installed: pip install 'gnm-env[cluster]'"
         ) from None
     _knock(address)
-    cloudpickle.register_pickle_by_value(experiments)
-    try:
-        with (
-            distributed.Client(address, set_as_default=False) as client,
-            client.get_executor(pure=False) as executor,
-        ):
-            yield executor
-    finally:
-        cloudpickle.unregister_pickle_by_value(experiments)
+    # The workers need not have these scripts: what a block needs of them travels with it.
+    for module in _scripts():
+        cloudpickle.register_pickle_by_value(module)
+    with (
+        distributed.Client(address, set_as_default=False) as client,
+        client.get_executor(pure=False) as executor,
+    ):
+        yield executor
+
+
+def _scripts() -> list[ModuleType]:
+    """The loaded modules of this folder."""
+    here = str(Path(__file__).resolve().parent)
+    return [
+        m for m in list(sys.modules.values()) if str(getattr(m, "__file__", "")).startswith(here)
+    ]
 
 
 def _knock(address: str) -> None:

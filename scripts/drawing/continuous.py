@@ -7,11 +7,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from agents.chemistry.mistakes import MOLECULES, Mistakes
+from agents.chemistry.mistakes import Mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN, Course
 from agents.continuous.outputs import course, pattern_spikes
 from experiments.continuous import untrained
-from experiments.reactions import TRACED, traced_trial, wrong_by_trial
+from experiments.reactions import MOLECULES, TRACED, traced_trial, wrong_by_trial
 from experiments.verdict import Results
 from figures_continuous import draw_classes, draw_mistakes, draw_volumes
 from gnm_env import Patterns, Task

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import RegularGridInterpolator
+from numpy.typing import NDArray
 
 from experiments.statistics import score
 
@@ -15,6 +15,8 @@ LARGEST_ETA = 0.6
 
 LINES = np.arange(0.05, 0.501, 0.005)
 """Candidates for α*; each line runs from (η = 0, α = α*) to α = 1."""
+
+Weights = NDArray[np.float64]
 
 _POINTS = 60
 """Points at which a line is looked up, evenly spaced in α."""
@@ -45,12 +47,39 @@ def best(scores: xr.DataArray) -> Cell:
 def optimal_line(scores: xr.DataArray) -> Line:
     """The line (1−η)α = α* with the highest mean score from α = α* to α = 1."""
     plane = scores.transpose("eta", "alpha")
-    look_up = RegularGridInterpolator((plane["eta"], plane["alpha"]), plane.to_numpy())
-    alphas = np.linspace(LINES, 1.0, _POINTS)
-    along = look_up(np.stack([1 - LINES / alphas, alphas], axis=-1)).mean(axis=0)
-    place = int(along.argmax())
-    column = np.stack([np.zeros(_POINTS), alphas[:, place]], axis=-1)
-    return Line(float(LINES[place]), float(along[place]), float(look_up(column).mean()))
+    along, uncorrected = line_means(plane["eta"].to_numpy(), plane["alpha"].to_numpy())
+    return best_line(along, uncorrected, plane.to_numpy())
+
+
+def best_line(along: Weights, uncorrected: Weights, plane: Weights) -> Line:
+    """The same from the weights that `line_means` gives, for scores (η, α) as an array."""
+    means = np.tensordot(along, plane, 2)
+    place = int(means.argmax())
+    return Line(float(LINES[place]), float(means[place]), float((uncorrected[place] * plane).sum()))
+
+
+def line_means(etas: Weights, alphas: Weights) -> tuple[Weights, Weights]:
+    """Weights (lines, η, α) with which a map's cells make the mean along each line, and at η = 0.
+
+    Scores between cells are interpolated linearly, so that a mean along a line is a sum over cells.
+    """
+    points = np.linspace(LINES, 1.0, _POINTS, axis=1)
+    on_line = 1 - LINES[:, None] / points
+    at_alpha = _interpolation(points, alphas)
+    return (
+        np.einsum("lpe,lpa->lea", _interpolation(on_line, etas), at_alpha) / _POINTS,
+        np.einsum("lpe,lpa->lea", _interpolation(0 * on_line, etas), at_alpha) / _POINTS,
+    )
+
+
+def _interpolation(at: Weights, grid: Weights) -> Weights:
+    """Weights (…, grid) of linear interpolation between grid values."""
+    right = np.clip(np.searchsorted(grid, at), 1, len(grid) - 1)
+    share = (at - grid[right - 1]) / (grid[right] - grid[right - 1])
+    weights = np.zeros((*at.shape, len(grid)))
+    np.put_along_axis(weights, right[..., None], share[..., None], -1)
+    np.put_along_axis(weights, right[..., None] - 1, 1 - share[..., None], -1)
+    return weights
 
 
 def residuals(results: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from experiments.map_analysis import best, optimal_line, residuals
+from experiments.map_analysis import best, best_line, line_means, optimal_line, residuals
 from experiments.statistics import Interval, bootstrap, by_seed, mean, score
 from experiments.verdict import Claim, Finding, Results
 from gnm_env import Task
@@ -131,14 +132,14 @@ def _judge_best(results: Results) -> Finding:
 
 def _line_gain(scores: xr.DataArray) -> tuple[float, Interval]:
     """α*, and how many bins the best line gains over η = 0 at the same values of α."""
-    template = scores.transpose("pattern_seed", "eta", "alpha")
+    weights = line_means(scores["eta"].to_numpy(), scores["alpha"].to_numpy())
 
-    def gain(sample: np.ndarray) -> float:
-        # As many seeds are drawn as there are, so that every sample has the template's shape.
-        line = optimal_line(_average(template.copy(data=sample)))
+    def gain(planes: NDArray[np.float64]) -> float:
+        line = best_line(*weights, planes.mean(axis=0))
         return line.score - line.uncorrected
 
-    return optimal_line(_average(scores)).alpha, bootstrap(gain, template.to_numpy(), resamples=500)
+    found = bootstrap(gain, by_seed(scores.transpose("pattern_seed", "eta", "alpha")))
+    return optimal_line(_average(scores)).alpha, found
 
 
 def _judge_line(results: Results) -> Finding:
@@ -203,7 +204,7 @@ def _judge_classes(results: Results) -> Finding:
 def _judge_eta_zero(results: Results) -> Finding:
     four = score(results["F4"]).sel(readout="V")
 
-    def share(sample: np.ndarray) -> float:
+    def share(sample: NDArray[np.float64]) -> float:
         average = sample.mean(axis=0)
         return float(average[0].max() / average.max())
 

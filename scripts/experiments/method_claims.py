@@ -14,6 +14,9 @@ from experiments.training import STARTS
 from experiments.verdict import Claim, Finding, Results
 
 COMPARABLE = (0.8, 1.25)
+FLAT = 1e-9
+"""Slopes up to this are rounding."""
+
 ALPHA = 0.01
 """Level of the two-sided sign tests."""
 
@@ -63,7 +66,7 @@ def _judge_one_class(results: Results) -> Finding:
         slope = bootstrap(_slope, lif, gnm)
         values = ratio(lif, gnm)
         comparable = bool(np.all((values >= COMPARABLE[0]) & (values <= COMPARABLE[1])))
-        held[_condition(start)] = comparable and slope.low > 0
+        held[_condition(start)] = comparable and slope.low > FLAT
         words.append(
             _ratio_words(start, lif, gnm, slope)
             + f", all in {values.min():.2f} … {values.max():.2f}"
@@ -76,7 +79,7 @@ def _judge_three_classes(results: Results) -> Finding:
     for start in STARTS:
         lif, gnm = ratios(results["F6"], 3, start)
         slope = bootstrap(_slope, lif, gnm)
-        held[_condition(start)] = _ratio_at(0, lif, gnm).high < 1 and slope.high < 0
+        held[_condition(start)] = _ratio_at(0, lif, gnm).high < 1 and slope.high < -FLAT
         words.append(_ratio_words(start, lif, gnm, slope))
     return Finding(all(held.values()), held, tuple(words))
 

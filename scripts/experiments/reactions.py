@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from agents.chemistry import ReactionNetwork, Reactor
-from agents.chemistry.mistakes import MOLECULES, count_mistakes
+from agents.chemistry.mistakes import count_mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN
 from agents.continuous import InputSpikes
 from experiments.continuous import CLASSES, trained
@@ -26,8 +26,11 @@ from experiments.training import (
 from experiments.verdict import Claim, Finding, Results
 from gnm_env import Patterns, Task, Trial
 
+MOLECULES = (10, 25, 50, 100, 200, 500, 1000, 2000)
+"""Molecules per input spike for which wrong outputs are counted."""
+
 TRACED = (25, 100, 500)
-"""Molecules per input spike in the paper's figure."""
+"""Those of the paper's figure."""
 
 CONVERSION = 10.0
 SEEDS = {"quick": 2, "paper": 4}
