@@ -34,7 +34,7 @@ def sizes(settings: Settings) -> Findings:
             {n: Task(background_bins=n) for n in (30, 100, 300, 1_000, 3_000)},
         ),
         "rate": (
-            "p, spikes per input and bin",
+            "p, spikes per bin",
             {p: Task(rate=p) for p in (0.001, 0.0025, 0.005, 0.01, 0.02)},
         ),
     }

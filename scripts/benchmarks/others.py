@@ -134,7 +134,7 @@ OTHERS: dict[str, tuple[str, Callable[[], Way]]] = {
 def forward(settings: Settings) -> Findings:
     """Listening only."""
     found = Findings()
-    agents = _agents()
+    agents = listeners()
     given = heard(agents, SIDE_BY_SIDE, settings.seed)
     expected = spikes_of_ours(agents, SIDE_BY_SIDE, settings.seed)
     subjects = [_ours(agents, settings)]
@@ -234,7 +234,7 @@ def numpy_training(trials: Sequence[Heard], weights: NDArray[np.float64]) -> NDA
     return weights
 
 
-def _agents() -> list[NeuronAgent]:
+def listeners() -> list[NeuronAgent]:
     """Neurons whose initial weights make them spike now and then."""
     return [
         NeuronAgent(GNM(alpha=ALPHA), AggregateLabel(), LISTENED.n_inputs, seed, 0.5)

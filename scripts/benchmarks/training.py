@@ -117,16 +117,16 @@ def side_by_side(settings: Settings) -> Findings:
 def alone(settings: Settings) -> Findings:
     """Every neuron and rule, one agent; ratios within which the paper's neurons are to stay."""
     section = "Training, one neuron alone"
-    first = "GNM η=0, ALL, alone"
+    first = "GNM η=0, ALL"
     fast = Target(80)
     half_more, twice = Target(1 / 1.5, "ratio"), Target(1 / 2, "ratio")
     kinds: dict[str, tuple[Neuron, Rule, tuple[Target, ...]]] = {
         first: (GNM(), AggregateLabel(), (fast,)),
-        "GNM η=0.5 h=200, ALL, alone": (GNM(eta=0.5), AggregateLabel(), (fast, twice)),
-        "GNM η=0, ET, alone": (GNM(), ErrorTrace(), (fast, half_more)),
-        "GNM η=0, ET modulated, alone": (GNM(), ErrorTrace(modulate=True), (fast, half_more)),
-        "LIF refractory 0, ALL, alone": (LIF(), AggregateLabel(), (fast, half_more)),
-        "MST, ALL, alone": (MST(), AggregateLabel(), (fast, half_more)),
+        "GNM η=0.5 h=200, ALL": (GNM(eta=0.5), AggregateLabel(), (fast, twice)),
+        "GNM η=0, ET": (GNM(), ErrorTrace(), (fast, half_more)),
+        "GNM η=0, ET modulated": (GNM(), ErrorTrace(modulate=True), (fast, half_more)),
+        "LIF refractory 0, ALL": (LIF(), AggregateLabel(), (fast, half_more)),
+        "MST, ALL": (MST(), AggregateLabel(), (fast, half_more)),
     }
     subjects = [
         learning(
@@ -275,17 +275,17 @@ def heat_map(settings: Settings) -> Findings:
         )
         timings.append(race([subject], once)[subject.name])
     minutes = [timing.seconds[0] * GRID**2 * MAP_SEEDS / 60 for timing in timings]
-    how = "done whole" if settings.full else f"from {cells} of {GRID**2:,} cells per pattern seed"
+    how = "the whole map" if settings.full else f"from {cells} of the {GRID**2:,} cells per seed"
     row = Row(
         "Heat map, 41 × 41 × 5",
-        f"on {n_cores} core{'s' * (n_cores > 1)}, {how}",
+        f"heat map on {n_cores} core{'s' * (n_cores > 1)}",
         "minutes",
         (sum(minutes) / len(minutes),) if settings.full else tuple(minutes),
         more_is_better=False,
         targets=(Target(5.0, aim=2.0),) if n_cores == 2 else (),
         cpu_share=tuple(timing.cpu_share[0] for timing in timings),
         note=f"{MAP_SEEDS * GRID**2:,} trainings of {TRIALS:,} trials, one class, each scored on "
-        f"{RUNS} streams",
+        f"{RUNS} streams; {how}",
     )
     return Findings(rows=[row])
 
