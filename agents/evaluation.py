@@ -52,9 +52,8 @@ def noisy_performance(
     seed = whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     bins = np.empty((len(agents), runs), np.int64)
-    if shared:
-        units = lane_groups(agents, task, patterns, threads)
-    else:
+    units = lane_groups(agents, task, patterns, threads)
+    if not shared:
         units = [
             (group, [b])
             for b in range(len(agents))
@@ -83,11 +82,23 @@ def _survived(group: Any, first_seed: int, runs: int, cap: int) -> NDArray[np.in
 def answers(
     agent: Any | Sequence[Any], task: Task, patterns: Patterns, trials: int = 2_000, seed: int = 0
 ) -> Answers:
-    """What an agent, or each agent of a list of one kind, answers to `trials` trials of `seed`."""
+    """What an agent, or each agent of a list, answers to `trials` trials of the stream `seed`."""
+    trials, seed = whole("trials", trials, low=1), whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
-    group = type(agents[0]).lanes(agents, task, patterns)
-    result: Answers = group.answer(np.random.default_rng(seed), whole("trials", trials, low=1))
-    return result
+    units = lane_groups(agents, task, patterns, threads=1)
+    parts = [group.answer(np.random.default_rng(seed), trials) for group, _ in units]
+    places = np.concatenate([places for _, places in units])
+
+    def in_order(arrays: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+        return np.concatenate(arrays)[np.argsort(places)]
+
+    return Answers(
+        in_order([part.table for part in parts]),
+        in_order([part.false_alarms for part in parts]),
+        parts[0].noise_bins,
+        in_order([part.wrong for part in parts]),
+        trials,
+    )
 
 
 @dataclass(frozen=True)
