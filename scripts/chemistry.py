@@ -189,7 +189,18 @@ def _draw(
     }
     if mistakes is not None:
         figures["F8_mistakes"] = draw_mistakes(mistakes)
-    return [str(path) for name in figures for path in save(figures[name], folder / name)]
+    paths = [str(path) for name in figures for path in save(figures[name], folder / name)]
+    if mistakes is not None:
+        save_counts(folder / "F8_mistakes.csv", mistakes)
+    return paths
+
+
+def save_counts(path: Path, mistakes: Mistakes) -> None:
+    """Wrong outputs as a table: a row for each trial, a column for each number of molecules."""
+    columns = ["neuron", "deterministic", *(str(number) for number in mistakes.molecules)]
+    rows = np.column_stack([mistakes.neuron, mistakes.deterministic, *mistakes.stochastic])
+    with atomic_write(path) as file:
+        np.savetxt(file, rows, "%d", ",", header=",".join(columns), comments="")
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -115,12 +115,12 @@ def draw_mistakes(mistakes: Mistakes) -> Figure:
             capsize=2.5,
             label="molecule by molecule (mean, 95 % interval)",
         )
-        limits = (
-            (mistakes.deterministic, "--", "infinitely many molecules"),
-            (mistakes.neuron, ":", "the neuron itself ($C\\to\\infty$ too)"),
-        )
-        for values, style, name in limits:
-            axis.axhline(values.mean(), color=INK, linestyle=style, linewidth=1.0, label=name)
+        # They may coincide, so that one has to be seen under the other.
+        neuron, smooth = mistakes.neuron.mean(), mistakes.deterministic.mean()
+        name = "the neuron itself ($C\\to\\infty$ too)"
+        axis.axhline(neuron, color=GREY, alpha=0.6, linewidth=3.0, label=name)
+        name = "infinitely many molecules"
+        axis.axhline(smooth, color=INK, linestyle="--", linewidth=1.0, label=name)
         axis.set_xscale("log")
         axis.set_xticks(mistakes.molecules, [f"{number:,}" for number in mistakes.molecules])
         axis.minorticks_off()

@@ -50,10 +50,13 @@ def test_one_command_draws_counts_and_exports(checkpoint: Path) -> None:
     assert len(told["deterministic_S"]) == len(told["outputs_alone"]) == 2
     assert told["targets"] == [1, 2]
     assert len(told["wrong_outputs"]["mean"]) == len(told["wrong_outputs"]["molecules"]) == 8
-    assert sorted(told["figures"]) == sorted(str(path) for path in out.iterdir())
-    names = {path.name for path in out.iterdir()}
     stems = ("F2_classes", "F8_volumes", "F8_mistakes")
-    assert names == {f"{stem}.{ending}" for stem in stems for ending in ("pdf", "png")}
+    names = {f"{stem}.{ending}" for stem in stems for ending in ("pdf", "png")}
+    assert {Path(path).name for path in told["figures"]} == names
+    assert {path.name for path in out.iterdir()} == names | {"F8_mistakes.csv"}
+    header, row = (out / "F8_mistakes.csv").read_text().splitlines()
+    assert header == "neuron,deterministic,10,20,50,100,200,500,1000,2000"
+    assert [int(cell) for cell in row.split(",")][2:] == told["wrong_outputs"]["mean"]
     document = libsbml.readSBMLFromFile(str(model))
     assert document.getNumErrors() == 0
     assert document.getModel().getParameter("molecules").getValue() == 5

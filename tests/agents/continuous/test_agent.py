@@ -77,7 +77,7 @@ def test_amounts_handed_out_bin_by_bin_are_those_of_the_whole_course(eta: float)
     amounts, ended = [], False
     while not ended:
         action = agent.act(obs)
-        assert env.action_space.contains(np.array([action]))
+        assert np.array([action], env.action_space.dtype) in env.action_space
         amounts.append(action)
         obs, _, ended, _, info = env.step(action)
     trial = draw_trial(TASK, PATTERNS, np.random.default_rng(7))
