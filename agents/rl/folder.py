@@ -9,7 +9,6 @@ SB3's zip holds pickled objects: load only what you trust.
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import os
@@ -135,7 +134,7 @@ def load_model(path: str | os.PathLike[str], kind: str, **arguments: Any) -> Bas
     """The SB3 model in a zip; ValueError if it is missing, damaged or of another algorithm."""
     algorithm = RECIPES[kind].algorithm
     try:
-        model: BaseAlgorithm = algorithm.load(path, device="cpu", **arguments)
+        model: BaseAlgorithm = algorithm.load(os.fspath(path), device="cpu", **arguments)
     except FileNotFoundError:
         raise ValueError(f"there is no model {path}; train and save again") from None
     except (zipfile.BadZipFile, ValueError, KeyError, RuntimeError, EOFError, OSError) as error:
@@ -144,16 +143,3 @@ def load_model(path: str | os.PathLike[str], kind: str, **arguments: Any) -> Bas
             f"({type(error).__name__}: {error}); train and save again"
         ) from None
     return model
-
-
-def same_world(about: Description, task: Task, patterns: Patterns, feedback: str) -> str:
-    """How a saved agent's world differs from the one wanted, in words; empty if it does not."""
-    for field in dataclasses.fields(Task):
-        ours, theirs = getattr(task, field.name), getattr(about.task, field.name)
-        if ours != theirs:
-            return f"{field.name} is {theirs!r} there and {ours!r} here"
-    if about.patterns != patterns:
-        return "its patterns are others (see --pattern-seed)"
-    if about.feedback != feedback:
-        return f"feedback is {about.feedback!r} there and {feedback!r} here"
-    return ""

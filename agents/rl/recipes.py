@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import torch
 from gymnasium.vector import VectorEnv
 from sb3_contrib import RecurrentPPO
@@ -208,7 +209,7 @@ def _require_senses(env: Any, senses: Senses, kind: str) -> None:
         raise ValueError(
             f"env must be a Gymnasium Env or an SB3 VecEnv, got {type(env).__name__}{hint}"
         )
-    if bool(senses.decays) != (env.observation_space.dtype.kind == "f"):
+    if bool(senses.decays) != np.issubdtype(env.observation_space.dtype, np.floating):
         raise ValueError(
             f"{kind} needs {'traces' if senses.decays else 'the raw bits'} as observations, "
             f"got {env.observation_space}; training_env(task, patterns, {kind!r}) gives them"

@@ -61,7 +61,8 @@ class SB3Agent(PolicyAgent):
         deterministic: bool = True,
     ) -> tuple[NDArray[np.int64], Any]:
         """Spikes for the bits of one bin, (N,) or (n, N): 0-d or (n,). Hand the state back in."""
-        bits = np.atleast_2d(np.asarray(observation))
+        observed = np.asarray(observation)
+        bits = np.atleast_2d(observed)
         n = len(bits)
         memory: Memory | None = state
         begins = np.full(n, memory is None)
@@ -77,8 +78,9 @@ class SB3Agent(PolicyAgent):
         spikes = actions
         if self.senses.rising_edge:
             spikes = np.where(actions > np.where(begins, 0, memory.actions), 1, 0)
-        single = np.ndim(observation) == 1
-        return (spikes.reshape(()) if single else spikes), Memory(traces, actions, policy_state)
+        if observed.ndim == 1:
+            spikes = spikes.reshape(())
+        return spikes, Memory(traces, actions, policy_state)
 
     def _followed(
         self, memory: Memory, bits: NDArray[Any], begins: NDArray[np.bool_]

@@ -146,7 +146,7 @@ def _protocol(part: str) -> dict[str, Any]:
         "defaults": defaults,
         "seeds": {
             "patterns": "default_rng((pattern_seed, 1))",
-            "training": "default_rng(training_seed) for neurons, seed=pattern_seed for SB3",
+            "training": "default_rng(training_seed) for neurons, seed=1000 * pattern_seed for SB3",
             "evaluation": "default_rng(evaluation_seed + run)",
         },
     }
@@ -239,7 +239,11 @@ def _rl_agent(setting: Setting, log: Log) -> int:
     budget = setting.get("steps", setting.get("budget", MATCHED[setting["classes"]]))
     env = training_env(task, log.patterns, kind, feedback=setting["feedback"])
     model = make_rl_agent(
-        kind, env, setting["pattern_seed"], spike_probability=setting.get("spike_probability", 0.01)
+        kind,
+        env,
+        # Environment i hears the stream of this seed + i.
+        1_000 * setting["pattern_seed"],
+        spike_probability=setting.get("spike_probability", 0.01),
     )
     agent = SB3Agent(model, task, RECIPES[kind].senses)
 

@@ -13,7 +13,6 @@ from stable_baselines3 import PPO
 
 from agents import noisy_performance
 from agents.rl import load, make_rl_agent, save, training_env
-from agents.rl.folder import described, same_world
 from gnm_env import Patterns, Task
 
 TASK = Task(n_classes=2, onset_probability=0.05)
@@ -53,14 +52,6 @@ def test_the_best_model_is_preferred_to_the_last(folder, model):
     best.save(folder / "best_model.zip")
     weights = load(folder)[0].policy.policy.action_net.weight.detach().numpy()
     np.testing.assert_array_equal(weights, best.policy.action_net.weight.detach().numpy())
-
-
-def test_worlds_that_differ_are_told_apart(folder):
-    about = described(folder)
-    assert same_world(about, TASK, PATTERNS, "cost") == ""
-    assert "n_classes is 2 there and 1 here" in same_world(about, Task(), PATTERNS, "cost")
-    assert "patterns" in same_world(about, TASK, Patterns.draw(TASK, 5), "cost")
-    assert "feedback" in same_world(about, TASK, PATTERNS, "dense")
 
 
 @pytest.mark.parametrize(

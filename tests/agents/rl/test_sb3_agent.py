@@ -57,7 +57,7 @@ class Recorder:
 @pytest.mark.parametrize("kind", ["ppo", "recurrent-ppo"])
 def test_evaluate_policy_and_noisy_performance_agree_exactly(kind):
     agent = SB3Agent(lively_model(kind), TASK, TRACES if kind == "ppo" else RAW)
-    returns, lengths = evaluate_policy(
+    returns, _ = evaluate_policy(
         agent, DummyVecEnv([lambda: stream(40)]), 12, return_episode_rewards=True, warn=False
     )
     survived = noisy_performance(agent, TASK, PATTERNS, runs=12, seed=40)
