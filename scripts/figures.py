@@ -16,7 +16,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import commandline
-from drawing import continuous, hysteresis, maps, methods, style
+from drawing import constant_input, continuous, maps, methods, style
 from experiments.registry import NAMES, SIZES
 from experiments.verdict import Results
 from store import StoreError, read
@@ -36,7 +36,7 @@ class Picture:
 
 PICTURES: dict[str, Picture] = {
     "F1": Picture(
-        hysteresis.constant_input,
+        constant_input.traces,
         ("F1",),
         "A neuron with η 0.8, α 0.3, β 0.1 under constant input. (c) Weak input (dashed) takes the "
         "membrane potential to a plateau below the threshold; strong input makes it cross the "

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.figure import Figure
 
 from agents import GNM, AggregateLabel, NeuronAgent, Recording, record
 from gnm_env import Task, Trial
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NEURON = GNM(eta=0.8, alpha=0.3, beta=0.1)
 BINS = 200
@@ -23,29 +28,58 @@ def constant_input(neuron: GNM, drive: float, bins: int = BINS) -> Recording:
     return record(agent, trial)
 
 
+def last_cycle(recording: Recording) -> slice:
+    """The bins from the last output spike but one to the last; ValueError if there are none."""
+    spikes = np.flatnonzero(recording.spikes)
+    if len(spikes) < 2:
+        raise ValueError(f"a cycle needs two output spikes, got {len(spikes)}: raise the input")
+    return slice(int(spikes[-2]), int(spikes[-1]) + 1)
+
+
 def hysteresis_picture() -> Figure:
-    """V(t) for both inputs, and D against V for the larger one."""
-    import matplotlib.pyplot as plt
+    """V(t) for both inputs, and D against V, drawn on the spot."""
+    return draw(*(constant_input(NEURON, drive) for drive in LEVELS.values()))
 
-    from drawing.style import styled
 
-    weak, strong = (constant_input(NEURON, drive) for drive in LEVELS.values())
-    with styled():
-        figure, (time, loop) = plt.subplots(1, 2, figsize=(8, 3.2))
-        time.plot(weak.V, color="black", ls="--", label=f"I = {LEVELS['sub-threshold']}")
-        time.plot(strong.V, color="black", label=f"I = {LEVELS['super-threshold']}")
-        time.axhline(NEURON.theta_r, color="0.6", lw=0.8, ls=":")
-        time.set(xlabel="time (bins)", ylabel="membrane potential V", ylim=(0, None))
-        time.set_title("c", loc="left", fontweight="bold")
-        time.set_ylim(0, 1.5)
-        time.legend(frameon=False, title="input per bin", loc="upper right", ncols=2)
-        loop.plot(strong.V, strong.D, ".-", color="black", lw=0.8, markersize=3)
-        for k in (4, int(np.argmax(strong.V[:50])), int(np.argmax(strong.D[:50]))):
-            loop.annotate(
-                "", (strong.V[k : k + 2].mean(), strong.D[k : k + 2].mean()),
-                (strong.V[k], strong.D[k]),
-                arrowprops={"arrowstyle": "-|>", "color": "#D55E00", "lw": 1.2},
-            )  # fmt: skip
-        loop.set(xlabel="membrane potential V", ylabel="decay D (per bin)")
-        loop.set_title("d", loc="left", fontweight="bold")
+def draw(weak: Recording, strong: Recording) -> Figure:
+    """V over time under weak and strong input, and D over V."""
+    from drawing import style
+
+    with style.styled():
+        figure, grid = style.panels(1, 2, width=style.WIDE, height=2.5)
+        _draw_potential(grid[0, 0], weak, strong)
+        _draw_loop(grid[0, 1], weak, strong)
     return figure
+
+
+def _draw_potential(axes: Axes, weak: Recording, strong: Recording) -> None:
+    from drawing import style
+
+    last = len(strong.V) - 1
+    axes.plot(strong.V, color=style.INK, lw=1.1, label="super-threshold input")
+    axes.plot(weak.V, color=style.BLUE, lw=1.4, ls="--", label="sub-threshold input")
+    axes.axhline(NEURON.theta_r, color=style.GREY, lw=0.8, ls=":")
+    axes.annotate(
+        "threshold", (last, NEURON.theta_r), xytext=(2, 0), textcoords="offset points",
+        va="center", fontsize=6, color=style.GREY, annotation_clip=False,
+    )  # fmt: skip
+    axes.set(xlabel="time (bins)", ylabel="membrane potential V", xlim=(0, last), ylim=(-0.1, 1.45))
+    axes.legend(loc="upper right", ncols=2)
+    style.letter(axes, "c")
+
+
+def _draw_loop(axes: Axes, weak: Recording, strong: Recording) -> None:
+    from drawing import style
+
+    cycle = last_cycle(strong)
+    V, D = strong.V[cycle], strong.D[cycle]
+    axes.plot(weak.V, weak.D, "--", color=style.BLUE, lw=1.4)
+    axes.plot(V, D, "o-", color=style.INK, lw=1.0, ms=2.2)
+    for k in np.unique(np.linspace(1, len(V) - 2, 9).astype(int)):
+        axes.annotate(
+            "", (V[k + 1], D[k + 1]), (V[k], D[k]),
+            arrowprops={"arrowstyle": "-|>", "color": style.RED, "lw": 0.9, "mutation_scale": 9},
+        )  # fmt: skip
+    axes.axvline(NEURON.theta_r, color=style.GREY, lw=0.8, ls=":")
+    axes.set(xlabel="membrane potential V", ylabel="decay D (per bin)")
+    style.letter(axes, "d")

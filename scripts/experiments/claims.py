@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from experiments import continuous, hysteresis, map_claims, method_claims, reactions
+from experiments import constant_input, continuous, map_claims, method_claims, reactions
 
 CLAIMS = (
-    *hysteresis.CLAIMS,
+    *constant_input.CLAIMS,
     *continuous.CLAIMS,
     *map_claims.CLAIMS,
     *method_claims.CLAIMS,

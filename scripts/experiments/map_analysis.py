@@ -93,5 +93,5 @@ def residuals(results: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     top_error = error.isel(alpha=scores.argmax("alpha")).drop_vars("alpha")
     residual = top - top.sel(eta=0.0)
     spread = np.hypot(top_error, top_error.sel(eta=0.0))
-    apart = {"eta": (scores["eta"] > 0) & (scores["eta"] <= LARGEST_ETA)}
+    apart = {"eta": (scores["eta"] > 0) & (scores["eta"] <= LARGEST_ETA + 1e-9)}
     return residual.isel(apart), spread.isel(apart)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from experiments import continuous, hysteresis, maps, methods, reactions
+from experiments import constant_input, continuous, maps, methods, reactions
 from experiments.design import Experiment
 
 SIZES = ("quick", "paper")
 
 BUILDERS: dict[str, Callable[[str, tuple[int, ...] | None], Experiment]] = {
-    "F1": hysteresis.constant_input,
+    "F1": constant_input.two_levels,
     "F2": continuous.two_classes,
     "F3": maps.one_class,
     "F3-published": maps.one_class_published,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from experiments import hysteresis
+from experiments import constant_input
 from experiments.design import Setting
 from experiments.methods import REFRACTORY
 from experiments.registry import experiment
@@ -86,7 +86,7 @@ def _runs(setting: Setting, score: Score, runs: int) -> list[int]:
 
 
 def _constant_input() -> xr.Dataset:
-    wanted = hysteresis.constant_input("quick")
+    wanted = constant_input.two_levels("quick")
     values = [wanted.compute(block) for block in wanted.blocks()]
     return xr.Dataset(
         {

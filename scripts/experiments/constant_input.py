@@ -2,63 +2,60 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from agents import GNM, AggregateLabel, NeuronAgent, record
+from agents import GNM, Recording
 from experiments.design import Axis, Block, Experiment, Variable
 from experiments.verdict import Claim, Finding, Results
-from gnm_env import Task, Trial
+from hysteresis import BINS, LEVELS, NEURON, constant_input, last_cycle
 
-NEURON = {"eta": 0.8, "alpha": 0.3, "beta": 0.1}
-BINS = 200
-LEVELS = {"sub-threshold": 0.05, "super-threshold": 0.15}
-"""Input per bin. Without a reset V settles at I / ((1−η)α): 0.83 and 2.5; the threshold is 1."""
+TRACES = {
+    "V": ("float64", "1", "membrane potential"),
+    "D": ("float64", "1/bin", "decay"),
+    "R": ("float64", "1", "recovery variable"),
+    "X": ("float64", "1", "readout"),
+    "spikes": ("int8", "1", "output spikes"),
+}
 
 
-def constant_input(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
+def two_levels(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """V, D and R over time for both levels of input; the same at every size."""
     levels = Axis("input", tuple(LEVELS), settings=tuple({"drive": v} for v in LEVELS.values()))
-    variables = (
-        Variable("V", "float64", "1", "membrane potential", ("bin",)),
-        Variable("D", "float64", "1/bin", "decay", ("bin",)),
-        Variable("R", "float64", "1", "recovery variable", ("bin",)),
-        Variable("spikes", "int8", "1", "output spikes", ("bin",)),
+    variables = tuple(
+        Variable(name, dtype, units, what, ("bin",))
+        for name, (dtype, units, what) in TRACES.items()
     )
-    return Experiment(
-        "F1", "A neuron under constant input", (levels,), NEURON, _watch, variables, {"bin": BINS}
-    )
+    title = "A neuron under constant input"
+    return Experiment("F1", title, (levels,), asdict(NEURON), _watch, variables, {"bin": BINS})
 
 
 def _watch(block: Block) -> dict[str, NDArray[Any]]:
-    traces = [_trace(dict(setting)) for setting in block.settings]
-    return {name: np.stack([trace[name] for trace in traces]) for name in traces[0]}
+    runs = [_run(dict(setting)) for setting in block.settings]
+    return {name: np.stack([getattr(run, name) for run in runs]) for name in TRACES}
 
 
-def _trace(setting: dict[str, Any]) -> dict[str, NDArray[Any]]:
-    """One channel that spikes in every bin is a constant input of its weight."""
+def _run(setting: dict[str, Any]) -> Recording:
     drive = setting.pop("drive")
-    agent = NeuronAgent(GNM(**setting), AggregateLabel(fraction=1.0), n_inputs=1)
-    agent.weights[:] = drive
-    trial = Trial.from_dense(np.ones((BINS, 1)), [], [], Task(n_inputs=1))
-    recording = record(agent, trial)
-    return {name: getattr(recording, name) for name in ("V", "D", "R", "spikes")}
+    return constant_input(GNM(**setting), drive)
+
+
+def recordings(results: xr.Dataset) -> list[Recording]:
+    """The recordings under weak and under strong input."""
+    return [
+        Recording(**{name: results[name].sel(input=level).to_numpy() for name in TRACES})
+        for level in LEVELS
+    ]
 
 
 # --- claims --------------------------------------------------------------------------------------
 
 RESET = 0.5
 LOOP = 0.1
-
-
-def cycle(results: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
-    """V and D from one output spike to the next, once the beginning is forgotten."""
-    driven = results.sel(input="super-threshold")
-    first, last = np.flatnonzero(driven["spikes"].to_numpy())[-2:]
-    return tuple(driven[name].to_numpy()[first : last + 1] for name in ("V", "D"))  # type: ignore[return-value]
 
 
 def loop_area(V: NDArray[Any], D: NDArray[Any]) -> float:
@@ -68,9 +65,7 @@ def loop_area(V: NDArray[Any], D: NDArray[Any]) -> float:
 
 
 def _judge_potential(results: Results) -> Finding:
-    data = results["F1"]
-    below = data["V"].sel(input="sub-threshold").to_numpy()
-    above = data["V"].sel(input="super-threshold").to_numpy()
+    below, above = (recording.V for recording in recordings(results["F1"]))
     peak, trough = above.max(), above[above.argmax() :].min()
     calm = bool(np.all(np.diff(below) > -1e-12) and below.max() < 1.0)
     reset = bool(peak >= 1.0 and trough <= RESET * peak)
@@ -86,7 +81,9 @@ def _judge_potential(results: Results) -> Finding:
 
 
 def _judge_hysteresis(results: Results) -> Finding:
-    area = loop_area(*cycle(results["F1"]))
+    strong = recordings(results["F1"])[1]
+    cycle = last_cycle(strong)
+    area = loop_area(strong.V[cycle], strong.D[cycle])
     return Finding(
         area >= LOOP,
         {},
