@@ -110,9 +110,10 @@ def save(found: Findings, folder: Path) -> None:
 
 def publish(found: Findings, picture: Path | None, docs: Path) -> None:
     """Write the page, and put the picture beside it."""
+    (docs / "images").mkdir(parents=True, exist_ok=True)
     (docs / "performance.md").write_text(page(found, picture is not None), encoding="utf-8")
     if picture is not None:
-        shutil.copyfile(picture, docs / "performance.png")
+        shutil.copyfile(picture, docs / "images/performance.png")
 
 
 def illustrated(found: Findings, folder: Path) -> Path | None:
@@ -156,7 +157,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--seed", type=int, default=0, help="of the streams; default: %(default)s")
     add("--out", type=Path, default=Path("results/benchmark"), metavar="FOLDER",
         help="default: %(default)s")  # fmt: skip
-    add("--publish", action="store_true", help="write docs/performance.md and performance.png")
+    add("--publish", action="store_true", help="write docs/performance.md and its picture")
     add("--last", action="store_true", help="measure nothing: show the last run that is in --out")
     add("--json", action="store_true", help="end with one JSON object")
     return parser.parse_args(arguments)

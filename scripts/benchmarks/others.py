@@ -28,6 +28,7 @@ LISTENED = Task(background_bins=200, mean_occurrences=0.0)
 SIDE_BY_SIDE = 16
 """Trials that the others work on at once: more no longer fit into the cache."""
 OURS = "agents, compiled"
+NUMPY = "NumPy, loop over bins"
 
 
 class Forward(NamedTuple):
@@ -123,7 +124,7 @@ def _in_torch(cell: Callable[[Any, Any], tuple[Any, Any]]) -> Way:
 
 
 OTHERS: dict[str, tuple[str, Callable[[], Way]]] = {
-    "NumPy, loop over bins": ("numpy", lambda: numpy_loop),
+    NUMPY: ("numpy", lambda: numpy_loop),
     "scipy.signal.lfilter": ("scipy", lambda: scipy_filter),
     "snnTorch, Leaky": ("snntorch", snntorch_leaky),
     "Norse, leaky integrator": ("norse", norse_leaky),
@@ -153,7 +154,7 @@ def forward(settings: Settings) -> Findings:
         race(subjects, settings),
         BINS,
         1e-6,
-        against=OURS,
+        against=NUMPY,
         notes=notes,
     )
     return found
@@ -180,7 +181,7 @@ def learning_trials(settings: Settings) -> Findings:
             race([ours, theirs], settings),
             BINS,
             1e-6,
-            against=ours.name,
+            against=theirs.name,
             notes={ours.name: f"the first {trials:,} trials"},
         )
     return Findings(rows=rows)

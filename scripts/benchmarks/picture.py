@@ -31,7 +31,8 @@ def draw(found: Findings, path: str | os.PathLike[str]) -> None:
         left, right = cast(Any, figure.subfigures(1, 2))
         if sought:
             _targets(left.add_subplot(), sought)
-        n_rows = 1 + (len(found.curves) + 2) // 3
+        panels_of = _by_symbol(found.curves)
+        n_rows = 1 + (len(panels_of) + 2) // 3
         panels = right.subplots(
             n_rows, 3, squeeze=False, gridspec_kw={"height_ratios": [1.3] + [1.0] * (n_rows - 1)}
         )
@@ -40,8 +41,8 @@ def draw(found: Findings, path: str | os.PathLike[str]) -> None:
             panel.remove()
         if beside:
             _others(right.add_subplot(grid[0, :]), [row for rows in beside for row in rows])
-        for k, curve in enumerate(found.curves):
-            _growth(right.add_subplot(grid[1 + k // 3, k % 3]), curve)
+        for k, curves in enumerate(panels_of):
+            _growth(right.add_subplot(grid[1 + k // 3, k % 3]), curves)
         machine = found.machine
         figure.suptitle(
             f"{machine['processor']}, {machine['instructions']}; Python {machine['python']}",
@@ -71,7 +72,8 @@ def _targets(axes: Any, sought: Sequence[tuple[Row, Target]]) -> None:
             _label(row, target),
             va="center",
             fontsize=7.5,
-            color="#333333",
+            bbox=WHITE,
+            zorder=5,
         )
     axes.axvline(1.0, color="black", lw=1.2, ls=(0, (4, 2)))
     axes.set_xscale("log")
@@ -142,21 +144,34 @@ def _others(axes: Any, rows: Sequence[Row]) -> None:
     axes.set_title("The same arithmetic by other software, one core", fontsize=9)
 
 
-def _growth(axes: Any, curve: Curve) -> None:
-    """Time against size, both on a logarithmic axis where the sizes are."""
-    middle = [median(values) for values in curve.values]
-    low, high = [min(v) for v in curve.values], [max(v) for v in curve.values]
-    if curve.flat:
-        centre = (max(middle) + min(middle)) / 2
-        axes.axhspan(0.8 * centre, 1.2 * centre, color="#dfeee8", zorder=0, label="±20 %")
-        axes.legend(frameon=False, fontsize=7, loc="lower right")
-    axes.fill_between(curve.sizes, low, high, color="#2a7f62", alpha=0.25, lw=0)
-    axes.plot(curve.sizes, middle, "o-", color="#2a7f62", ms=3.5, lw=1.3)
+def _by_symbol(curves: Sequence[Curve]) -> list[list[Curve]]:
+    """Curves over the same quantity share a panel."""
+    panels: dict[str, list[Curve]] = {}
+    for curve in curves:
+        panels.setdefault(curve.symbol, []).append(curve)
+    return list(panels.values())
+
+
+def _growth(axes: Any, curves: Sequence[Curve]) -> None:
+    """Times against size; the times logarithmic too if they differ much."""
+    lowest = min(min(v) for curve in curves for v in curve.values)
+    highest = max(max(v) for curve in curves for v in curve.values)
+    for curve, colour in zip(curves, (COLOURS[MET], "#4a6fa5", GREY), strict=False):
+        middle = [median(values) for values in curve.values]
+        if curve.flat:
+            centre = (max(middle) + min(middle)) / 2
+            axes.axhspan(0.8 * centre, 1.2 * centre, color=colour, alpha=0.13, lw=0, zorder=0)
+        spread = ([min(v) for v in curve.values], [max(v) for v in curve.values])
+        axes.fill_between(curve.sizes, *spread, color=colour, alpha=0.25, lw=0)
+        label = curve.name + (" (band: ±20 %)" if curve.flat else "")
+        axes.plot(curve.sizes, middle, "o-", color=colour, ms=3.5, lw=1.3, label=label)
     axes.set_xscale("log")
-    if max(middle) > 8 * min(middle):
+    if highest > 8 * lowest:
         axes.set_yscale("log")
     else:
-        axes.set_ylim(0, 1.25 * max(high))
-    axes.set_xlabel(curve.symbol)
-    axes.set_ylabel(curve.unit, fontsize=8)
-    axes.set_title(f"Growth: {curve.name}", fontsize=9)
+        axes.set_ylim(0, 1.3 * highest)
+    if len(curves) > 1 or curves[0].flat:
+        axes.legend(frameon=False, fontsize=6.5, loc="lower left")
+    axes.set_xlabel(curves[0].symbol)
+    axes.set_ylabel(curves[0].unit, fontsize=8)
+    axes.set_title(f"Growth: {curves[0].name}", fontsize=9)

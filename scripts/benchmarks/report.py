@@ -120,7 +120,7 @@ def _points(curve: Curve) -> Iterable[tuple[float, tuple[float, ...]]]:
 
 # --- the page ------------------------------------------------------------------------------------
 
-PICTURE = "![Targets reached, other software, and growth](performance.png)"
+PICTURE = "![Targets reached, other software, and growth](images/performance.png)"
 
 INTRODUCTION = """\
 # Performance
@@ -140,7 +140,7 @@ is measured.
 
 
 def page(found: Findings, with_picture: bool = True) -> str:
-    """The page in Markdown; the picture is to lie beside it."""
+    """The page in Markdown; its picture is to lie in images/."""
     text = [
         INTRODUCTION.format(
             summary=summary(found),
