@@ -19,11 +19,21 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.task import Patterns, Task
+from gnm_env.task import Patterns, Task, world
 
 FORMAT = 1
 _HEADER = "header"
 _KINDS: dict[str, type] = {}
+_BIT_GENERATORS = {
+    cls.__name__: cls
+    for cls in (
+        np.random.MT19937,
+        np.random.PCG64,
+        np.random.PCG64DXSM,
+        np.random.Philox,
+        np.random.SFC64,
+    )
+}
 _Class = TypeVar("_Class", bound=type)
 
 
@@ -61,6 +71,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     Raises ValueError if the folder cannot be written.
     """
     target = Path(path)
+    if target.is_dir():
+        raise ValueError(f"cannot write {target}: it is a folder; give the path of a file in it")
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     except OSError as error:
@@ -118,7 +130,8 @@ def _plain(value: Any) -> Any:
 def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, NDArray[Any]]]:
     """Kind, header and arrays of a checkpoint; ValueError if it is none or is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        # Opened here, since np.load forgets to close what turns out to be no zip.
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         header = json.loads(arrays.pop(_HEADER).tobytes())
         if header["format"] != FORMAT:
@@ -146,15 +159,17 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
             shape = tuple(header["patterns_shape"])
             bits = np.unpackbits(arrays.pop("patterns"), count=int(np.prod(shape)))
             patterns = Patterns.from_dense(bits.reshape(shape))
+        if task is not None and patterns is not None:
+            world(task, patterns)  # they must fit each other
         agent = _KINDS[kind].from_checkpoint(header, arrays)  # type: ignore[attr-defined]
         return Checkpoint(agent, task, patterns, _generator(header.get("rng")))
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{path} is not a valid {kind} checkpoint: {error}") from None
 
 
 def _generator(state: dict[str, Any] | None) -> Generator | None:
     if state is None:
         return None
-    bit_generator = getattr(np.random, state["bit_generator"])()
+    bit_generator = _BIT_GENERATORS[state["bit_generator"]]()
     bit_generator.state = state
     return Generator(bit_generator)

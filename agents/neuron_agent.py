@@ -296,6 +296,7 @@ class NeuronAgent:
         agent.weights = arrays["weights"]
         if arrays["momentum"].shape != (agent.n_inputs,):
             raise ValueError(f"momentum must have shape ({agent.n_inputs},)")
+        _require_finite(arrays["momentum"], "momentum")
         agent.momentum[:] = arrays["momentum"]
         return agent
 
@@ -312,11 +313,11 @@ def _names(classes: Mapping[str, type]) -> str:
     return ", ".join(cls.__name__ for cls in classes.values())
 
 
-def _require_finite(weights: NDArray[np.float64]) -> None:
-    if not np.isfinite(weights).all():
-        bad = int(np.flatnonzero(~np.isfinite(np.atleast_1d(weights)))[0])
+def _require_finite(values: NDArray[np.float64], name: str = "weights") -> None:
+    if not np.isfinite(values).all():
+        bad = int(np.flatnonzero(~np.isfinite(np.atleast_1d(values)))[0])
         raise ValueError(
-            f"weights must be finite, got {np.atleast_1d(weights)[bad]} for input {bad}; "
+            f"{name} must be finite, got {np.atleast_1d(values)[bad]} for input {bad}; "
             "load an earlier checkpoint or start anew"
         )
 
