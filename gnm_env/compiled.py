@@ -1,33 +1,22 @@
 """Just-in-time compilation whose results are kept on disk and are never stale.
 
 Numba's own cache looks at the file of the compiled function only: after an edit to a function that
-it calls in another file, the old machine code would go on running. Here the cache also carries a
-digest of every source file of the packages concerned, so that any edit compiles anew.
+it calls in another file, the old machine code would go on running. Here the cache also goes by the
+source files of everything that the function calls, and by the constants that it uses.
 """
 
 from __future__ import annotations
 
-import functools
 import hashlib
+import sys
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from numba import njit
-from numba.core.caching import IndexDataCacheFile
-
-_ROOT = Path(__file__).resolve().parent.parent
-
-
-@functools.cache
-def _digest(package: str) -> str:
-    """A digest of all sources that code of `package` may call: its own and those of gnm_env."""
-    digest = hashlib.sha1()
-    for name in sorted({"gnm_env", package}):
-        for path in sorted((_ROOT / name).rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -36,15 +25,8 @@ def compiled(function: Callable[..., Any]) -> Any:
     No fast-math: the same operations in the same order give the same bits everywhere, which the
     tests of "same bits" rely on. Division by zero follows IEEE (infinity or NaN), as in NumPy.
     """
-    dispatcher: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
-    package = function.__module__.partition(".")[0]
-    if package in ("gnm_env", "agents"):
-        cache = dispatcher._cache
-        cache._cache_file = IndexDataCacheFile(
-            cache_path=cache._cache_path,
-            filename_base=cache._impl.filename_base,
-            source_stamp=_digest(package),
-        )
+    dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
+    dispatcher._cache = _Cache(function)
     return dispatcher
 
 
@@ -63,3 +45,56 @@ def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any
     function.__qualname__ = function.__name__
     function.__doc__ = template.__doc__
     return compiled(function)
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of one function, valid only as long as nothing that it rests on has changed."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._function = function
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        self._cache_file._source_stamp = _digest(self._function)
+        return super().load_overload(sig, target_context)
+
+
+def _digest(function: Any) -> str:
+    """A digest of the sources and constants that the compiled `function` rests on.
+
+    Taken at the first call, when every name that the function uses has got its value.
+    """
+    packages = {"gnm_env", function.__module__.partition(".")[0]}
+    files: set[str] = set()
+    constants: list[str] = []
+    seen: set[int] = set()
+    waiting = [function]
+    while waiting:
+        current = waiting.pop()
+        if id(current) in seen:
+            continue
+        seen.add(id(current))
+        files.add(current.__code__.co_filename)
+        for name in sorted(set(_names(current.__code__)) & current.__globals__.keys()):
+            value = current.__globals__[name]
+            if isinstance(value, Dispatcher):
+                value = value.py_func
+            module = getattr(value, "__module__", None) or ""
+            if module.partition(".")[0] in packages:
+                files.add(str(sys.modules[module].__file__))
+                if isinstance(value, types.FunctionType):
+                    waiting.append(value)
+            elif isinstance(value, (bool, int, float, str)):
+                constants.append(f"{current.__qualname__}.{name}={value!r}")
+    digest = hashlib.sha1("\n".join(sorted(constants)).encode())
+    for file in sorted(files):
+        digest.update(Path(file).read_bytes())
+    return digest.hexdigest()
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    """Global names that a function uses, those of functions inside it included."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _names(constant)

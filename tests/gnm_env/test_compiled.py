@@ -1,0 +1,54 @@
+"""Compiled code is kept on disk, and an edit anywhere below it compiles anew."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from gnm_env.compiled import compiled, specialise
+
+FACTOR = 2.0
+
+
+def template(x: float) -> float:
+    return FACTOR * x
+
+
+def test_specialise_binds_names_of_the_template() -> None:
+    assert specialise(template, "three", FACTOR=3.0)(2.0) == 6.0
+    assert compiled(template)(2.0) == 4.0
+
+
+def test_an_edit_to_a_called_function_in_another_file_is_noticed(tmp_path: Path) -> None:
+    package = tmp_path / "growing"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "outer.py").write_text(
+        "from gnm_env.compiled import compiled\n"
+        "from growing.inner import inner\n"
+        "@compiled\n"
+        "def outer(x):\n"
+        "    return inner(x) + 1\n"
+    )
+
+    def answer(increment: int) -> tuple[str, ...]:
+        (package / "inner.py").write_text(
+            "from gnm_env.compiled import compiled\n"
+            f"STEP = {increment}\n"
+            "@compiled\n"
+            "def inner(x):\n"
+            "    return x + STEP\n"
+        )
+        code = (
+            "from growing.outer import outer\n"
+            "print(outer(10), sum(outer.stats.cache_hits.values()))"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return tuple(done.stdout.split())
+
+    assert answer(1) == ("12", "0")
+    assert answer(1) == ("12", "1")
+    assert answer(5) == ("16", "0")
