@@ -6,7 +6,8 @@
     python scripts/benchmark.py --publish           also writes docs/performance.md and its picture
 
 Everything runs on one core, the idlest, unless a row says otherwise. Writes benchmark.json and
-benchmark.png into --out.
+benchmark.png into --out. What cannot be measured here (a package is missing) is skipped with a line;
+a measurement that fails is named at the end, and the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -196,4 +197,11 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 if __name__ == "__main__":
     chosen = parse()
-    commandline.run(lambda: main(chosen), as_json=chosen.json, name="benchmark")
+    result: dict[str, Any] = {}
+
+    def measured() -> dict[str, Any]:
+        result.update(main(chosen))
+        return result
+
+    commandline.run(measured, as_json=chosen.json, name="benchmark")
+    sys.exit(1 if result["failed"] else 0)

@@ -148,7 +148,11 @@ def forward(settings: Settings) -> Findings:
         require_agreement(name, way(given), expected)
         work = SIDE_BY_SIDE * LISTENED.background_bins * LANES
         subjects.append(Subject(name, lambda _, way=way: way(given), work))  # type: ignore[misc]
-    notes = {OURS: "draws its trials as well"}
+    notes = {
+        OURS: "draws its trials within its time; the others get them as a dense raster, "
+        f"{SIDE_BY_SIDE} trials of {LISTENED.background_bins} bins side by side, and all count "
+        "the same output spikes"
+    }
     found.rows += rate_rows(
         f"Listening only, {LANES} neurons, beside other software",
         race(subjects, settings),

@@ -160,18 +160,19 @@ def _growth(axes: Any, curves: Sequence[Curve]) -> None:
         middle = [median(values) for values in curve.values]
         if curve.flat:
             centre = (max(middle) + min(middle)) / 2
-            axes.axhspan(0.8 * centre, 1.2 * centre, color=colour, alpha=0.13, lw=0, zorder=0)
+            axes.axhspan(
+                0.8 * centre, 1.2 * centre, color=colour, alpha=0.13, lw=0, zorder=0, label="±20 %"
+            )
         spread = ([min(v) for v in curve.values], [max(v) for v in curve.values])
         axes.fill_between(curve.sizes, *spread, color=colour, alpha=0.25, lw=0)
-        label = curve.name + (" (band: ±20 %)" if curve.flat else "")
-        axes.plot(curve.sizes, middle, "o-", color=colour, ms=3.5, lw=1.3, label=label)
+        axes.plot(curve.sizes, middle, "o-", color=colour, ms=3.5, lw=1.3, label=curve.label or "_")
     axes.set_xscale("log")
     if highest > 8 * lowest:
         axes.set_yscale("log")
     else:
         axes.set_ylim(0, 1.3 * highest)
     if len(curves) > 1 or curves[0].flat:
-        axes.legend(frameon=False, fontsize=6.5, loc="lower left")
+        axes.legend(frameon=False, fontsize=7, loc="lower left").set_in_layout(False)
     axes.set_xlabel(curves[0].symbol)
     axes.set_ylabel(curves[0].unit, fontsize=8)
-    axes.set_title(f"Growth: {curves[0].name}", fontsize=9)
+    axes.set_title(f"by {curves[0].name.partition(',')[0]}", fontsize=9)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from statistics import median
 from typing import Any
 
 from benchmarks.rows import BEST_ONLY, MET, MISSED, Curve, Findings, Row, Target
+from progress import duration
 
-HEADINGS = ("", "median", "unit", "min … max", "best", "× as fast", "core", "target", "")
+HEADINGS = ("", "median", "unit", "min … max", "best", "× as fast", "core", "target", "reached")
 SHARED = 0.95
 """Below this share of a core's time the machine was busy with something else as well."""
 
@@ -125,50 +127,54 @@ PICTURE = "![Targets reached, other software, and growth](images/performance.png
 INTRODUCTION = """\
 # Performance
 
-This page is written by `python scripts/benchmark.py --publish` from its last run. {summary}
+{summary} This page is written by `python scripts/benchmark.py --publish` from its last run.
 
 {picture}## How it was measured
 
-Command: `{command}`. Every number is the median of {repeats} repeats; all competitors of a section
-take turns, so that a disturbance hits all alike, and every second round goes backwards. The process
-was {pinned}. Best is the least disturbed repeat. "Core" is the share of a core's time that the
-measurement had (200 % with two threads on two cores): where it is well below 100 %, other programs
-ran too. A *neuron-bin* is one neuron living through one bin of one trial, its part of the learning
-included. Everything compiled was compiled before the clock started, except where the start is what
-is measured.
+`{command}`{took}. Every number is the median of {repeats} repeats, unless only one is given. All \
+competitors of a section take turns, so that a disturbance hits all alike, and every second round \
+goes backwards; ratios compare within a round. The process was {pinned}. *Best* is the least \
+disturbed repeat. *Core* is the share of a core's time that the measurement had (200 % with two \
+threads on two cores): where it is well below 100 %, other programs ran too. A *neuron-bin* is one \
+neuron living through one bin of one trial, with its part of the learning. Everything was compiled \
+before the clock started, except where the start is what is measured.
 """
+
+MEMORY = """\
+Training n neurons with N inputs side by side takes at most 56·N·n + 14,000·n + (528 + 8·N·p)·T \
+bytes and 4 MiB, where p is the rate of input spikes and T the longest trial in bins: \
+O(N·n + T·block), with blocks of 32 neurons. The agents are counted. The table above compares this \
+with the peak of the resident memory."""
 
 
 def page(found: Findings, with_picture: bool = True) -> str:
     """The page in Markdown; its picture is to lie in images/."""
-    text = [
-        INTRODUCTION.format(
-            summary=summary(found),
-            picture=f"{PICTURE}\n\n" if with_picture else "",
-            command=found.settings["command"],
-            repeats=found.settings["repeats"],
-            pinned="kept on one core unless a row says otherwise"
-            if found.machine["pinned"]
-            else "not kept on a core, which this system does not offer",
-        ),
-        _machine(found.machine),
-        "## Numbers",
-    ]
+    seconds = found.settings.get("seconds")
+    introduction = INTRODUCTION.format(
+        summary=summary(found),
+        picture=f"{PICTURE}\n\n" if with_picture else "",
+        command=found.settings["command"],
+        took=f" took {duration(seconds)}" if seconds else ", not finished",
+        repeats=found.settings["repeats"],
+        pinned="kept on one core unless a row says otherwise"
+        if found.machine["pinned"]
+        else "not kept on a core, which this system does not offer",
+    )
+    text = [*map(_wrapped, introduction.split("\n\n")), _machine(found.machine), "## Numbers"]
     for section, rows in sections(found.rows):
         text += [f"### {section}", _markdown(HEADINGS, [cells(row) for row in rows]), _notes(rows)]
     if found.curves:
-        text += ["## Growth", "Medians; one neuron-bin, or one step of one environment."]
+        text += ["## Growth", "Medians of the time for one neuron-bin, or one environment's step."]
         text += [_curve(curve) for curve in found.curves]
-    text += ["## Memory", MEMORY]
+    text += ["## Memory", _wrapped(MEMORY)]
     if found.skipped or found.failed:
         text += ["## Left out", "\n".join(f"- {line}" for line in found.skipped + found.failed)]
     return "\n\n".join(part.strip() for part in text if part.strip()) + "\n"
 
 
-MEMORY = """\
-Training many neurons takes at most 56·N·n + 14,000·n + (528 + 8·N·p)·T bytes, with N inputs, n
-neurons, spike rate p and a longest trial of T bins: O(N·n + T·block), where a block is 32 neurons.
-The table above compares it with the peak of the resident memory."""
+def _wrapped(paragraph: str) -> str:
+    """A paragraph in lines of at most 100 characters."""
+    return textwrap.fill(paragraph, 100, break_long_words=False, break_on_hyphens=False)
 
 
 def _machine(machine: dict[str, Any]) -> str:
@@ -190,7 +196,7 @@ def _machine(machine: dict[str, Any]) -> str:
 
 def _notes(rows: Iterable[Row]) -> str:
     noted = [(note, list(group)) for note, group in groupby(rows, key=lambda row: row.note) if note]
-    return "\n".join(f"*{', '.join(row.name for row in group)}*: {note}." for note, group in noted)
+    return "\n".join(f"- {', '.join(row.name for row in group)}: {note}." for note, group in noted)
 
 
 def _curve(curve: Curve) -> str:

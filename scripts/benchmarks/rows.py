@@ -93,6 +93,7 @@ class Curve:
         values: per size, one per repeat.
         flat: whether it is to be flat, within ±20 %.
         note: what else belongs to the setting.
+        label: in a panel that holds several curves.
     """
 
     name: str
@@ -102,6 +103,7 @@ class Curve:
     values: tuple[tuple[float, ...], ...]
     flat: bool = False
     note: str = ""
+    label: str = ""
 
 
 @dataclass
