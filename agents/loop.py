@@ -39,6 +39,9 @@ def train(
 
     Returns:
         The learning curve. Ends with the same bits as `train_many` on the same seed.
+
+    Raises:
+        ValueError: if a number is out of range, or if `env` ends a trial without its label.
     """
     trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
     sign_only = getattr(env.unwrapped, "feedback", None) == "sign"
@@ -57,6 +60,12 @@ def train(
             while not ended:
                 obs, reward, terminated, truncated, info = env.step(agent.act(obs))
                 ended = terminated or truncated
+            if "label" not in info:
+                raise ValueError(
+                    "env must tell the aggregate label at the end of each trial, as "
+                    f"gnm/PatternTrial-v0 does, got info {info} from {env}; "
+                    "a trial must not be truncated"
+                )
             agent.learn(float(reward), info, sign_only)
             error = abs(info["label"] - info["emitted"])
             wrong += error > getattr(env.unwrapped, "tolerance", 0.0)
