@@ -60,7 +60,7 @@ def _compute(store: Store, pending: list[Block], executor: Executor, progress: P
         while futures:
             finished, _ = wait(futures, timeout=1.0, return_when=FIRST_COMPLETED)
             for future in finished:
-                _keep(store, futures.pop(future), future.result())
+                store.write(futures.pop(future), *future.result())
                 progress.advance()
             progress.tick()
     except OSError as error:
@@ -72,10 +72,6 @@ def _compute(store: Store, pending: list[Block], executor: Executor, progress: P
     finally:
         for future in futures:
             future.cancel()
-
-
-def _keep(store: Store, block: Block, outcome: Outcome) -> None:
-    store.write(block, outcome.values, outcome.seconds, outcome.host)
 
 
 def workers(

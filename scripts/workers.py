@@ -11,11 +11,12 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 from experiments.design import Block
 
@@ -23,19 +24,15 @@ CONNECTION_SECONDS = 5
 """How long a scheduler may take to answer."""
 
 
-class Outcome(NamedTuple):
-    """A finished block: its arrays, how long it took, and the machine that computed it."""
-
-    values: Mapping[str, Any]
-    seconds: float
-    host: str
+Outcome = tuple[Mapping[str, Any], float, str]
+"""A finished block: its arrays, how many seconds it took, and the machine that computed it."""
 
 
 def timed(compute: Callable[[Block], Mapping[str, Any]], block: Block) -> Outcome:
     """Compute a block. Runs in the worker."""
     start = time.monotonic()
     values = compute(block)
-    return Outcome(values, time.monotonic() - start, socket.gethostname())
+    return values, time.monotonic() - start, socket.gethostname()
 
 
 @contextmanager
@@ -58,21 +55,49 @@ def cluster(address: str) -> Iterator[Executor]:
     Raises ValueError if Dask is not installed, or if no scheduler answers.
     """
     try:
-        import cloudpickle  # type: ignore[import-untyped]
         import distributed
     except ImportError:
         raise ValueError(
             "--scheduler needs Dask, which is not installed: pip install 'gnm-env[cluster]'"
         ) from None
     _knock(address)
-    # The workers need not have these scripts: what a block needs of them travels with it.
-    for module in _scripts():
-        cloudpickle.register_pickle_by_value(module)
     with (
         distributed.Client(address, set_as_default=False) as client,
         client.get_executor(pure=False) as executor,
     ):
-        yield executor
+        yield _Travelling(executor)
+
+
+class _Travelling(Executor):
+    """Hands calls on to a Dask executor whose workers need not have these scripts.
+
+    Functions of the modules in this folder travel by value, as bytes that only the worker opens.
+    (Left to itself Dask sends names, and they would have to be importable there.)
+    """
+
+    def __init__(self, executor: Executor) -> None:
+        import cloudpickle  # type: ignore[import-untyped]
+
+        self._executor, self._pickle = executor, cloudpickle
+        for module in _scripts():
+            cloudpickle.register_pickle_by_value(module)
+
+    def submit(  # type: ignore[override]
+        self, function: Callable[..., Any], /, *arguments: Any
+    ) -> Future[Any]:
+        call = self._pickle.dumps(_Call(function, arguments))
+        return self._executor.submit(self._pickle.loads, call)
+
+
+@dataclass(frozen=True)
+class _Call:
+    """A call that is made where it is unpickled, and becomes its result there."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return self.function, self.arguments
 
 
 def _scripts() -> list[ModuleType]:

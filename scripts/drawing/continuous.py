@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from agents.chemistry.mistakes import Mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN, Course
 from agents.continuous.outputs import course, pattern_spikes
 from experiments.continuous import untrained
-from experiments.reactions import MOLECULES, TRACED, traced_trial, wrong_by_trial
+from experiments.reactions import pooled, traced_trial
 from experiments.verdict import Results
 from figures_continuous import draw_classes, draw_mistakes, draw_volumes
 from gnm_env import Patterns, Task
@@ -36,25 +35,17 @@ def volumes(results: Results) -> Figure:
     data = results["F8"].isel(classes=0).sel(pattern_seed=SHOWN)
     task = Task(n_classes=int(data["classes"]))
     trial = traced_trial(task, Patterns.draw(task, SHOWN), int(data["evaluation_seed"]))
-    stochastic = {m: _course(data["V"].isel(traced=k)) for k, m in enumerate(TRACED)}
+    stochastic = {int(m): _course(data["V"].sel(traced=m)) for m in data["traced"]}
     return draw_volumes(trial, _course(data["V_deterministic"]), stochastic)
 
 
 def mistakes(results: Results) -> Figure:
     """Wrong outputs per trial against the number of molecules, over all seeds."""
-    data = results["F8"].isel(classes=0)
-    return draw_mistakes(
-        Mistakes(
-            np.array(MOLECULES),
-            wrong_by_trial(results["F8"]).T,
-            _trials(data["wrong_deterministic"]),
-            _trials(data["wrong_neuron"]),
-        )
-    )
-
-
-def _trials(values: xr.DataArray) -> NDArray[np.int64]:
-    return values.transpose("pattern_seed", "heard").to_numpy().ravel()
+    data = results["F8"]
+    stochastic = pooled(data["wrong"], "heard", "molecules").T
+    alone = (data[name].transpose("classes", "pattern_seed", "heard").to_numpy().ravel()
+             for name in ("wrong_deterministic", "wrong_neuron"))  # fmt: skip
+    return draw_mistakes(Mistakes(data["molecules"].to_numpy(), stochastic, *alone))
 
 
 def _course(V: xr.DataArray) -> Course:

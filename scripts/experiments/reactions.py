@@ -13,7 +13,7 @@ from agents.chemistry.mistakes import count_mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN
 from agents.continuous import InputSpikes
 from experiments.continuous import CLASSES, trained
-from experiments.design import Block, Experiment, Variable
+from experiments.design import Block, Coordinate, Experiment, Variable
 from experiments.statistics import Interval, bootstrap, mean
 from experiments.training import (
     WEIGHTS,
@@ -74,8 +74,12 @@ def volumes(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (class_counts(CLASSES), pattern_seeds(seeds or tuple(range(SEEDS[size]))))
     described = protocol(Task(), [common]) | {"molecules": MOLECULES, "traced": TRACED, "gap": GAP}
     title = "Trained neurons as chemical reaction networks, two classes"
-    seeds_of = stream_seeds(axes)
-    return Experiment("F8", title, axes, common, _react, variables, lengths, described, seeds_of)
+    coordinates = (
+        *stream_seeds(axes),
+        Coordinate("molecules", ("molecules",), np.array(MOLECULES), "molecules per input spike"),
+        Coordinate("traced", ("traced",), np.array(TRACED), "molecules per input spike"),
+    )
+    return Experiment("F8", title, axes, common, _react, variables, lengths, described, coordinates)
 
 
 def traced_trial(task: Task, patterns: Patterns, seed: int) -> Trial:
@@ -114,16 +118,15 @@ def _react(block: Block) -> dict[str, NDArray[Any]]:
 # --- the claim -----------------------------------------------------------------------------------
 
 
-def wrong_by_trial(results: xr.Dataset) -> NDArray[np.int64]:
-    """Wrong outputs of each trial of every seed, (trials, molecules)."""
-    wrong = results["wrong"].squeeze("classes").transpose("pattern_seed", "heard", "molecules")
-    return wrong.to_numpy().reshape(-1, len(MOLECULES))
+def pooled(values: xr.DataArray, within: str, last: str) -> NDArray[Any]:
+    """Values of all seeds in one row, (seeds × `within`, `last`)."""
+    ordered = values.squeeze("classes").transpose("pattern_seed", within, last).to_numpy()
+    return ordered.reshape(-1, ordered.shape[-1])
 
 
 def _shrinkage(results: xr.Dataset) -> list[Interval]:
     """Deviation at each number of traced molecules over that at the next larger one."""
-    deviation = results["deviation"].squeeze("classes")
-    runs = deviation.transpose("pattern_seed", "run", "traced").to_numpy().reshape(-1, len(TRACED))
+    runs = pooled(results["deviation"].sel(traced=list(TRACED)), "run", "traced")
     return [
         bootstrap(lambda a, b: float(a.mean() / b.mean()), runs[:, k], runs[:, k + 1])
         for k in range(len(TRACED) - 1)
@@ -132,7 +135,7 @@ def _shrinkage(results: xr.Dataset) -> list[Interval]:
 
 def _judge(results: Results) -> Finding:
     shrinks = _shrinkage(results["F8"])
-    wrong = wrong_by_trial(results["F8"])[:, [MOLECULES.index(m) for m in TRACED]]
+    wrong = pooled(results["F8"]["wrong"].sel(molecules=list(TRACED)), "heard", "molecules")
     fewer = mean(wrong[:, 0] - wrong[:, -1])
     means = wrong.mean(axis=0)
     approaches = all(found.low > 1 for found in shrinks)

@@ -156,7 +156,8 @@ def chemistry(deviation: Any, wrong: Any) -> xr.Dataset:
                 ("classes", "pattern_seed", "molecules", "heard"),
                 np.array([[w + k % 2 for k in range(12)] for w in wrong])[None, None],
             ),
-        }
+        },
+        {"molecules": list(MOLECULES), "traced": list(TRACED)},
     )
 
 
