@@ -6,8 +6,8 @@
     python scripts/benchmark.py --publish           also writes docs/performance.md and its picture
 
 Everything runs on one core, the idlest, unless a row says otherwise. Writes benchmark.json and
-benchmark.png into --out. What cannot be measured here (a package is missing) is skipped with a line;
-a measurement that fails is named at the end, and the exit code is then 1.
+benchmark.png into --out. What cannot be measured here, because a package is missing, is skipped
+with a line; a measurement that fails is named at the end, and the exit code is then 1.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ def table(found: Findings) -> str:
             lines.append(_aligned(cells(row), widths))
     for curve in found.curves:
         lines += ["", f"{curve.name}: {curve.unit}" + (f" ({curve.note})" if curve.note else "")]
-        lines += [f"  {size:>12,g}  {number(median(v))}" for size, v in _points(curve)]
+        lines += [f"  {size:>12,.10g}  {number(median(v))}" for size, v in _points(curve)]
     lines += ["", *(f"skipped: {text}" for text in found.skipped)]
     lines += [f"FAILED: {text}" for text in found.failed]
     return "\n".join([*lines, summary(found)])
@@ -200,7 +200,7 @@ def _notes(rows: Iterable[Row]) -> str:
 
 
 def _curve(curve: Curve) -> str:
-    head = (curve.symbol, *(f"{size:,g}" for size in curve.sizes))
+    head = (curve.symbol, *(f"{size:,.10g}" for size in curve.sizes))
     line = (curve.unit, *(number(median(v)) for _, v in _points(curve)))
     note = f" ({curve.note})" if curve.note else ""
     return f"### By {curve.name}{note}\n\n" + _markdown(head, [line])
