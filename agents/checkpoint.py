@@ -7,6 +7,7 @@ agent registers itself with `register_kind`, so that `load_checkpoint` opens any
 from __future__ import annotations
 
 import contextlib
+import importlib
 import json
 import os
 import tempfile
@@ -24,6 +25,12 @@ from gnm_env.task import Patterns, Task, world
 FORMAT = 1
 _HEADER = "header"
 _KINDS: dict[str, type] = {}
+_HOMES = {
+    "neuron": "agents.neuron_agent",
+    "continuous": "agents.continuous",
+    "network": "agents.network",
+}
+"""Where the kinds of this package register themselves: imported when such a file is loaded."""
 _BIT_GENERATORS = {
     cls.__name__: cls
     for cls in (
@@ -149,8 +156,10 @@ def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, N
 def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     """Load an agent of any kind with all that was saved beside it; ValueError if it is damaged."""
     kind, header, arrays = read(path)
+    if kind not in _KINDS and kind in _HOMES:
+        importlib.import_module(_HOMES[kind])
     if kind not in _KINDS:
-        known = ", ".join(sorted(_KINDS))
+        known = ", ".join(sorted({*_KINDS, *_HOMES}))
         raise ValueError(f"{path} holds an agent of kind {kind!r}; known kinds: {known}")
     try:
         task = Task(**header["task"]) if "task" in header else None
