@@ -1,0 +1,119 @@
+"""What a network is made of, and how it learns: numbers that check themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gnm_env.checks import choice, real, whole
+
+MAX_HIDDEN = 10_000
+"""Most hidden neurons of a Network: with more, the record of one trial fills the memory."""
+
+NOISE_ERRORS = ("above", "spikes")
+
+
+@dataclass(frozen=True)
+class Network:
+    """A hidden layer of GNM neurons (η = 0), and a GNM neuron that reads it out.
+
+    With the input spikes s, the weights W (N, H) and u (H,), and all else 0 before the first bin:
+
+        v_k(t) = (1 − α) v_k(t−1) − c Σ_{l≠k} z_l(t−1) + Σ_i W_ik s_i(t)    hidden potentials
+        z_k(t) = H(v_k(t)), H(v) = v^h / (ϑ_B^h + v^h), 0 for v ≤ 0         hidden outputs
+        j_k(t) = (1 − κ) j_k(t−1) + z_k(t)                                  decaying currents
+        V(t)   = (1 − α) V(t−1) + Σ_k u_k j_k(t)                            potential of the readout
+
+    An output spike is an upward crossing of ϑ_R by V. Raises ValueError if a parameter is out of
+    range.
+
+    Attributes:
+        hidden: H, number of hidden neurons; None leaves the layer out, V(t) = (1 − α) V(t−1) +
+            Σ_i u_i s_i(t) with u (N,), to compare with error-trace learning.
+        alpha: α, decay per bin of all membrane potentials, 0 … 1.
+        inhibition: c, what each unit of a hidden neuron's output takes from the potentials of the
+            others in the next bin.
+        kappa: κ, decay per bin of the currents into the readout, 0 … 1.
+        theta_b: ϑ_B, potential at which a hidden neuron gives half of its full output.
+        h: exponent of the Hill function, finite and >= 1; an infinite one has no gradient.
+        theta_r: ϑ_R, readout threshold.
+    """
+
+    hidden: int | None = 10
+    alpha: float = 0.3
+    inhibition: float = 0.05
+    kappa: float = 0.9
+    theta_b: float = 1.0
+    h: float = 4.0
+    theta_r: float = 1.0
+
+    name: ClassVar[str] = "network"
+    default_initial_weight: ClassVar[float] = 0.3
+
+    def __post_init__(self) -> None:
+        if self.hidden is not None:
+            object.__setattr__(self, "hidden", _checked_hidden(self.hidden))
+        for name in ("alpha", "kappa"):
+            real(name, getattr(self, name), low=0.0, high=1.0)
+        real("inhibition", self.inhibition, low=0.0)
+        for name in ("theta_b", "theta_r"):
+            real(name, getattr(self, name), above=0.0)
+        real("h", self.h, low=1.0)
+
+    @property
+    def width(self) -> int:
+        """H, 0 where there is no hidden layer."""
+        return self.hidden or 0
+
+    @property
+    def threshold(self) -> float:
+        """The readout's threshold for an output spike."""
+        return self.theta_r
+
+
+def _checked_hidden(value: Any) -> int:
+    try:
+        return whole("hidden", value, low=1, high=MAX_HIDDEN)
+    except ValueError as error:
+        raise ValueError(
+            f"{error}; for a neuron without a hidden layer use NeuronAgent with ErrorTrace"
+        ) from None
+
+
+@dataclass(frozen=True)
+class BackPropagation:
+    """Backpropagation of the error trace (BP): ascend J = Σ_t E(t) V(t), with E held fixed.
+
+    E(t) is, over each occurrence of a pattern, the spikes that it is owed less those given in it,
+    and over noise −1 where `noise_error` says. The gradient is exact, through time and through the
+    inhibition. Raises ValueError if a parameter is out of range.
+
+    Attributes:
+        learning_rate_hidden: λ of the weights W into the hidden layer.
+        learning_rate_output: λ of the weights u into the readout.
+        momentum: fraction of the previous weight change that is added, 0 … 1.
+        noise_error: where in noise E is −1: "above", in every bin with V ≥ ϑ_R, or "spikes", only
+            in those with an output spike.
+        lift_above: whether an occurrence that is owed more spikes raises V in all of its bins, as
+            in error-trace learning, or only in those with V < ϑ_R: an upward crossing cannot begin
+            in the others, and raising them too keeps a network that is above threshold for long
+            there for ever.
+    """
+
+    learning_rate_hidden: float = 3e-3
+    learning_rate_output: float = 3e-3
+    momentum: float = 0.2
+    noise_error: str = "above"
+    lift_above: bool = False
+
+    name: ClassVar[str] = "bp"
+
+    def __post_init__(self) -> None:
+        for name in ("learning_rate_hidden", "learning_rate_output"):
+            real(name, getattr(self, name), low=0.0)
+        real("momentum", self.momentum, low=0.0, high=1.0)
+        choice("noise_error", self.noise_error, NOISE_ERRORS)
+        if not isinstance(self.lift_above, (bool, np.bool_)):
+            raise ValueError(f"lift_above must be True or False, got {self.lift_above!r}")
