@@ -39,6 +39,8 @@ MOST_SPIKES = 10
 # Bound by `kernels`; the values here only say what belongs there.
 WIDTH = 1
 LEARN_WIDTH = 8
+WRONG_BEYOND = 0.0
+"""A trial counts as wrong if its sum is further than this from the label; ½ for graded output."""
 Parameters: Any = None
 State: Any = None
 step: Any = None
@@ -255,12 +257,10 @@ def train_template(
                 )
                 outcome, _ = run_trial(p, mode, weights[block], heard, log)
                 error = outcome.label - outcome.emitted
-                store(wrong[block], 0, load(wrong[block], 0, zero) + where(error != 0.0, 1.0, zero))
-                store(
-                    absolute[block],
-                    0,
-                    load(absolute[block], 0, zero) + where(error < 0.0, zero - error, error),
-                )
+                error = where(error < 0.0, zero - error, error)
+                missed = where(error > WRONG_BEYOND, 1.0, zero)
+                store(wrong[block], 0, load(wrong[block], 0, zero) + missed)
+                store(absolute[block], 0, load(absolute[block], 0, zero) + error)
                 ended = load(overflow[block], 0, zero)
                 c = where(ended < 0.0, correction(outcome), zero)
                 store(corrections, 0, c)

@@ -68,7 +68,9 @@ def train(
                 )
             agent.learn(float(reward), info, sign_only)
             error = abs(info["label"] - info["emitted"])
-            wrong += error > getattr(env.unwrapped, "tolerance", 0.0)
+            # Amounts are never exactly right: an agent that gives them says what counts as wrong.
+            tolerance = getattr(env.unwrapped, "tolerance", 0.0)
+            wrong += error > max(tolerance, getattr(agent, "wrong_beyond", 0.0))
             absolute += error
             if agent.overflowed and history.overflowed < 0:
                 history.overflowed = np.array(trial)
