@@ -12,7 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents import checkpoint
-from agents.continuous.kernels import continuous_kernels
+from agents.continuous.kernels import WRONG_BEYOND, continuous_kernels
 from agents.continuous.neuron import ContinuousGNM
 from agents.learning.rule import Rule
 from agents.neuron_agent import RULES, NeuronAgent
@@ -39,6 +39,7 @@ class ContinuousAgent(NeuronAgent):
     """
 
     neuron: ContinuousGNM
+    wrong_beyond = WRONG_BEYOND
 
     def __init__(
         self,

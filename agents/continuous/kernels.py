@@ -282,6 +282,9 @@ def foresee_template(
     return amounts
 
 
+WRONG_BEYOND = 0.5
+"""A sum is answered wrongly if it is further than this from what is owed."""
+
 STEPS = {True: ("continuous_exact", exact_step), False: ("continuous_numerical", numerical_step)}
 """The step for η = 0 and for other η, each with its name."""
 
@@ -316,7 +319,14 @@ def _continuous_kernels(name: str, step: Any, rule: type[Rule], study: Any) -> A
     eligibility = specialise(sum_eligibility_template, together, **of_rule)
     learn = specialise(learn_trial_template, together, **of_rule, sum_eligibility=eligibility)
     # The log is kept whatever the rule: it needs the room that rules with an error ask for.
-    all_ = {**of_neuron, **of_rule, "USES_ERROR": True, "run_trial": trial, "learn_trial": learn}
+    all_ = {
+        **of_neuron,
+        **of_rule,
+        "USES_ERROR": True,
+        "WRONG_BEYOND": WRONG_BEYOND,
+        "run_trial": trial,
+        "learn_trial": learn,
+    }
 
     def study_amounts(
         mode: Any, parameters: Block, sign: float, heard: Heard, label: int, log: Log, *rest: Any

@@ -60,6 +60,7 @@ def test_the_loop_and_the_compiled_trainer_end_with_the_same_bits(rule: Rule, et
     assert np.array_equal(looped.momentum, others[1].momentum)
     assert not np.array_equal(looped.weights, make(rule, eta=eta).weights)
     np.testing.assert_allclose(slow.mean_error, fast.mean_error[:, 1], rtol=1e-12)
+    assert slow.error_rate.tolist() == fast.error_rate[:, 1].tolist()
 
 
 def test_the_sign_alone_teaches_the_aggregate_label_rule_the_same() -> None:
@@ -266,6 +267,7 @@ def test_training_brings_the_sum_near_what_is_owed() -> None:
     agent = make(RULES[2])
     history = train_many([agent], TASK, PATTERNS, 4_000, seed=1)
     assert history.mean_error[-1, 0] < 0.5 * history.mean_error[0, 0]
+    assert 0.0 < history.error_rate[-1, 0] < history.error_rate[0, 0] < 1.0
 
 
 @pytest.mark.slow
