@@ -193,8 +193,14 @@ def _summary(entries: list[Entry]) -> Summary:
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Hold `folder`'s lock. The kernel gives it back when the process ends, however it ends."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with open(f"{folder}.lock", "a+", encoding="utf-8") as handle:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        handle = open(f"{folder}.lock", "a+", encoding="utf-8")  # noqa: SIM115 (closed below)
+    except OSError as error:
+        raise StoreError(
+            f"cannot write in {folder.parent} ({error.strerror}): choose another folder"
+        ) from None
+    with handle:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

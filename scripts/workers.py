@@ -65,10 +65,10 @@ def cluster(address: str) -> Iterator[Executor]:
         distributed.Client(address, set_as_default=False) as client,
         client.get_executor(pure=False) as executor,
     ):
-        yield _Travelling(executor)
+        yield Travelling(executor)
 
 
-class _Travelling(Executor):
+class Travelling(Executor):
     """Hands calls on to a Dask executor whose workers need not have these scripts.
 
     Functions of the modules in this folder travel by value, as bytes that only the worker opens.

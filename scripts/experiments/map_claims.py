@@ -302,8 +302,7 @@ CLAIMS = (
         "F3e",
         "Fig. 3, caption",
         f"The MST averages ≈ {MST_PAPER:.0f} on one class",
-        "MST, ALL, 60,000 trials, 48 pattern seeds; matched and published initial weights; caps "
-        "10,000 and 1,000",
+        "MST, ALL, 60,000 trials; matched and published initial weights; caps 10,000 and 1,000",
         f"reproduced if the mean lies within a factor of 2 of {MST_PAPER:.0f} at cap 10,000 "
         "from both "
         "starts; conditional on start and cap",

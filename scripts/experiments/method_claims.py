@@ -117,7 +117,7 @@ def _judge_error_trace(results: Results) -> Finding:
 
 
 def _et_conditions(held: dict[tuple[str, str], bool]) -> dict[str, bool]:
-    return {f"ET is {name} from {start} initial weights": holds
+    return {f"it is {name} from {start} initial weights": holds
             for (name, start), holds in held.items()}  # fmt: skip
 
 
@@ -136,11 +136,11 @@ def _judge_back_propagation(results: Results) -> Finding:
 
 
 _F6_PROTOCOL = (
-    "GNM (η 0, α 0.3) and LIF (α 0.3, refractory 0 … 25), ALL, 60,000 trials, 48 pattern seeds; "
+    "GNM (η 0, α 0.3) and LIF (α 0.3, refractory 0 … 25), ALL, 60,000 trials; "
     "matched and published initial weights"
 )
 _F7_PROTOCOL = (
-    "η 0, α 0.3, τ_m 20, τ_s 5, 60,000 trials, 50 pattern seeds, every method on the same streams; "
+    "η 0, α 0.3, τ_m 20, τ_s 5, 60,000 trials, every method on the same streams; "
     "matched and published initial weights"
 )
 

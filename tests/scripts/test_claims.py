@@ -74,7 +74,7 @@ def test_the_form_of_error_trace_learning_is_a_condition() -> None:
         good = setting["rule"] == "et" and setting.get("modulate")
         return 1_500.0 if good and setting["start"] == "published" else 500.0
 
-    expected = f"{REPRODUCED} if ET is modulated ET from published initial weights"
+    expected = f"{REPRODUCED} if it is modulated ET from published initial weights"
     assert found("F7b", modulated_alone).verdict == expected
 
 

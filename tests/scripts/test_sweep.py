@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ import xarray as xr
 from experiments.design import Block
 from store import DATA, read, summarise
 from sweep import pattern_seeds, sweep
+from tests.scripts import toys
 from tests.scripts.toys import toy, work
-from workers import cluster, threads
+from workers import Travelling, cluster, threads, timed
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -114,7 +116,7 @@ def test_seeds_are_a_number_a_list_or_a_range(text: str, seeds: tuple[int, ...])
     ("arguments", "complaint"),
     [
         (["F99"], "there is no experiment 'F99': choose one of F1, F2"),
-        (["F1", "--store", "/proc/nowhere/F1"], "/proc/nowhere"),
+        (["F1", "--store", "/proc/nowhere/F1"], "cannot write in /proc/nowhere (No such file"),
         (["F1", "--threads", "0"], "--threads must be at least 1, got 0"),
     ],
 )
@@ -169,6 +171,33 @@ def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"sweep: no Dask scheduler answers at {nowhere}")
     assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+
+
+def test_a_block_travels_to_a_process_that_has_none_of_these_scripts(tmp_path: Path) -> None:
+    cloudpickle = pytest.importorskip("cloudpickle")
+    sent: list[bytes] = []
+
+    class Wire(ThreadPoolExecutor):
+        def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Any:
+            assert function is cloudpickle.loads
+            sent.extend(arguments)
+
+    with Wire(1) as wire:
+        travelling = Travelling(wire)
+        cloudpickle.register_pickle_by_value(toys)
+        travelling.submit(timed, toys.work, toys.toy().blocks()[3])
+    (tmp_path / "call").write_bytes(sent[0])
+    program = (
+        "import cloudpickle; v, _, _ = cloudpickle.loads(open('call', 'rb').read());"
+        "print(v['error_rate'].ravel().tolist())"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-I", "-c", program], capture_output=True, text=True, cwd=tmp_path
+    )
+
+    assert ended.returncode == 0, ended.stderr
+    expected = toys.work(toys.toy().blocks()[3])["error_rate"].ravel().tolist()
+    assert json.loads(ended.stdout) == expected
 
 
 @pytest.mark.slow
