@@ -161,6 +161,27 @@ def test_the_work_is_the_bins_that_the_environment_shows() -> None:
     assert training.bins(Task(n_classes=2), 3, 5) == steps
 
 
+@pytest.mark.parametrize(("full", "values"), [(False, 3), (True, 1)])
+def test_a_heat_map_is_scaled_up_from_a_part_or_done_whole(
+    full: bool, values: int, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, small in {"GRID": 3, "MAP_SEEDS": 2, "TRIALS": 5, "RUNS": 1, "CAP": 10}.items():
+        monkeypatch.setattr(training, name, small)
+    monkeypatch.setattr(training, "MAP_PART", {True: 4})
+    monkeypatch.setattr(Settings, "least_seconds", 0.0)
+    measured = training.heat_map(replace(settings, full=full)).rows[0]
+    assert len(measured.values) == values
+    assert ("the whole map" in measured.note) == full
+    assert 0 < measured.median < 5
+
+
+def test_a_part_of_the_map_reaches_from_corner_to_corner() -> None:
+    part = [(n.neuron.alpha, n.neuron.eta) for n in training.grid(65)]  # type: ignore[attr-defined]
+    assert part[0] == (0.0, 0.0) and part[-1] == (1.0, 1.0)
+    assert len(set(part)) == 65
+    np.testing.assert_allclose(np.mean(part, axis=0), 0.5, atol=0.02)
+
+
 # --- other software does the same arithmetic -----------------------------------------------------
 
 
