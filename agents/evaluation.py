@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.lane_group import Answers
-from agents.many import lane_groups
+from agents.many import lane_groups, thread_count
 from agents.policy import as_agent
 from gnm_env.checks import whole
 from gnm_env.stream_env import MAX_EPISODE_BINS
@@ -52,6 +52,7 @@ def noisy_performance(
     seed = whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     bins = np.empty((len(agents), runs), np.int64)
+    threads = thread_count(threads)
     units = lane_groups(agents, task, patterns, threads)
     if not shared:
         units = [
@@ -65,7 +66,7 @@ def noisy_performance(
         first = seed if shared else seed + places[0] * runs
         bins[places] = _survived(group, first, runs, cap)
 
-    with ThreadPoolExecutor(threads or len(units)) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         list(pool.map(fill, range(len(units))))
     return bins if isinstance(agent, Sequence) else bins[0]
 

@@ -57,6 +57,7 @@ def train_many(
     """
     trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
     rng = seed if isinstance(seed, Generator) else np.random.default_rng(seed)
+    threads = thread_count(threads)
     units = lane_groups(agents, task, patterns, threads)
     history = History(
         error_rate=np.empty((0, len(agents))),
@@ -64,7 +65,7 @@ def train_many(
         overflowed=np.full(len(agents), -1),
     )
     try:
-        with ThreadPoolExecutor(max(len(units), 1)) as pool:
+        with ThreadPoolExecutor(threads) as pool:
             for start in range(0, trials, block):
                 size = min(block, trials - start)
                 _train_block(units, pool, rng, size, history)
@@ -110,15 +111,17 @@ def _write_back(units: list[Unit]) -> None:
         group.write_back()
 
 
-def lane_groups(
-    agents: Sequence[Any], task: Task, patterns: Patterns, threads: int | None
-) -> list[Unit]:
+def thread_count(threads: int | None) -> int:
+    """`threads`, checked; None: one per core that this process may use."""
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    return whole("threads", threads, low=1)
+
+
+def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: int) -> list[Unit]:
     """Agents grouped by kind and cut into units for the threads, each with its agents' places."""
     if not isinstance(agents, Sequence) or len(agents) == 0:
         raise ValueError(f"agents must be a list of at least one agent, got {agents!r}")
-    if threads is None:
-        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    threads = whole("threads", threads, low=1)
     _require_memory(agents, task)
     kinds: dict[Hashable, list[int]] = defaultdict(list)
     for place, agent in enumerate(agents):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -56,6 +56,9 @@ class NeuronAgent:
         ValueError: if an argument is out of range.
     """
 
+    graded: ClassVar[bool] = False
+    """Whether actions are amounts instead of spikes."""
+
     def __init__(
         self,
         neuron: Neuron,
@@ -67,6 +70,11 @@ class NeuronAgent:
     ) -> None:
         if not isinstance(neuron, Neuron):
             raise ValueError(f"neuron must be one of {_names(NEURONS)}, got {neuron!r}")
+        if neuron.graded != self.graded:
+            raise ValueError(
+                f"a {type(self).__name__} cannot have {neuron!r}: spikes and amounts do not mix; "
+                "amounts are for agents.continuous.ContinuousAgent"
+            )
         if not isinstance(rule, Rule):
             raise ValueError(f"rule must be one of {_names(RULES)}, got {rule!r}")
         self.neuron = neuron

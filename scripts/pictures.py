@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from agents import History, record
-from agents.recording import Recording
 from drawing.style import styled
 from gnm_env import Patterns, Task, Trial, draw_trial
 
@@ -61,7 +60,7 @@ def training_picture(agent: Any, task: Task, patterns: Patterns, history: Histor
         )
         potential.sharex(raster)
         draw_raster(raster, trial)
-        draw_potential(potential, trial, record(agent, trial), threshold_of(agent))
+        draw_potential(potential, trial, agent)
         raster.tick_params(labelbottom=False)
         potential.set_xlabel("time (bins)")
         draw_learning_curve(curve, history)
@@ -93,8 +92,16 @@ def shade(axes: Axes, trial: Trial) -> None:
         )
 
 
-def draw_potential(axes: Axes, trial: Trial, recording: Recording, threshold: float) -> None:
-    """The readout with its threshold, and the output spikes above it."""
+def output_of(agent: Any, trial: Trial) -> float:
+    """The agent's output in a whole trial: spikes, or the amount of S."""
+    agent.begin_trial()
+    return float(sum(agent.act(row) for row in trial.dense().view(np.int8)))
+
+
+def draw_potential(axes: Axes, trial: Trial, agent: Any) -> None:
+    """The readout with its threshold and the output: spikes above it, or S shaded below it."""
+    recording, threshold = record(agent, trial), threshold_of(agent)
+    graded = getattr(agent, "graded", False)
     shade(axes, trial)
     t = np.arange(trial.n_bins) + 0.5
     axes.plot(t, recording.X, color="black", lw=0.9)
@@ -104,9 +111,16 @@ def draw_potential(axes: Axes, trial: Trial, recording: Recording, threshold: fl
         ha="left", va="center", fontsize=8, color="0.4",
     )  # fmt: skip
     top = max(float(recording.X.max()), threshold) * 1.12
-    spikes = t[recording.spikes]
-    axes.plot(spikes, np.full(len(spikes), top), "v", color="#D55E00", markersize=5)
-    axes.set(ylabel="readout, spikes (▾)", ylim=(min(0.0, float(recording.X.min())), top * 1.08))
+    if graded:
+        over = recording.X >= threshold
+        axes.fill_between(t, 0.0, recording.X, where=over, step="mid", color="#D55E00", lw=0)
+    else:
+        spikes = t[recording.spikes]
+        axes.plot(spikes, np.full(len(spikes), top), "v", color="#D55E00", markersize=5)
+    axes.set(
+        ylabel="V, output S shaded" if graded else "readout, spikes (▾)",
+        ylim=(min(0.0, float(recording.X.min())), top * 1.08),
+    )
 
 
 def draw_learning_curve(axes: Axes, history: History) -> None:
@@ -130,11 +144,10 @@ def response_picture(agent: Any, task: Task, patterns: Patterns) -> Figure:
         )  # fmt: skip
         for class_, axes in enumerate(rows[:, 0]):
             trial = lone_pattern(task, patterns, class_)
-            recording = record(agent, trial)
-            draw_potential(axes, trial, recording, threshold_of(agent))
-            given, owed = int(recording.spikes.sum()), task.owed[class_]
+            draw_potential(axes, trial, agent)
+            given, owed = output_of(agent, trial), task.owed[class_]
             axes.set_title(
-                f"class {class_}: owes {owed}, given {given}",
+                f"class {class_}: owes {owed}, given {given:.3g}",
                 loc="left", color=class_colour(class_), fontsize=9,
             )  # fmt: skip
         rows[-1, 0].set_xlabel("time (bins)")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -39,6 +39,7 @@ class ContinuousAgent(NeuronAgent):
     """
 
     neuron: ContinuousGNM
+    graded: ClassVar[bool] = True
     wrong_beyond = WRONG_BEYOND
 
     def __init__(

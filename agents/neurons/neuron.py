@@ -54,6 +54,8 @@ class Neuron(ABC):
     default_initial_weight: ClassVar[float]
     parameters_type: ClassVar[type]
     state_type: ClassVar[type]
+    graded: ClassVar[bool] = False
+    """Whether the output of a bin is an amount instead of a spike."""
 
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
