@@ -44,21 +44,6 @@ def append_noise(
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Append `n_bins` bins of noise, the first of them bin `bin_`. Each bit is Bernoulli(p)."""
     offsets = grown(offsets, bin_ + n_bins + 1)
-    return _noise_into(rng, world, n_bins, channels, offsets, bin_), offsets
-
-
-@compiled
-def _noise_into(
-    rng: Generator,
-    world: World,
-    n_bins: int,
-    channels: NDArray[np.int32],
-    offsets: NDArray[np.int64],
-    bin_: int,
-) -> NDArray[np.int32]:
-    """`append_noise` where `offsets` is long enough; returns `channels` or its longer copy."""
-    for t in range(bin_, bin_ + n_bins):
-        offsets[t + 1] = 0
     position, n_events, done = _fill_noise(
         rng, world, n_bins, channels, offsets, bin_, -1, offsets[bin_]
     )
@@ -67,8 +52,7 @@ def _noise_into(
         position, n_events, done = _fill_noise(
             rng, world, n_bins, channels, offsets, bin_, position, n_events
         )
-    _accumulate(offsets, bin_, n_bins)
-    return channels
+    return channels, offsets
 
 
 @compiled
@@ -82,26 +66,32 @@ def _fill_noise(
     position: int,
     n_events: int,
 ) -> tuple[int, int, bool]:
-    """Add noise spikes until the end of the bins (True) or of the buffer (False).
+    """Add noise spikes until the end of the bins (True) or of `channels` (False: to be continued).
 
     The bits are taken in one row, bin by bin. The gap to the next 1 is geometric,
-    floor(exponential / −ln(1−p)), so that only the spikes cost a draw; `position` is the last 1.
-    Counts the spikes of bin t in offsets[t + 1].
+    floor(exponential / −ln(1−p)), so that only the spikes cost a draw; `position` is the last 1
+    (−1 at the beginning), `n_events` the number of spikes so far.
     """
+    if position < 0:
+        for t in range(bin_, bin_ + n_bins):
+            offsets[t + 1] = 0
     n_inputs = np.uint64(world.n_inputs)
     n_bits = n_bins * world.n_inputs
-    while n_events < channels.size:
+    done = False
+    while n_events < channels.size and not done:
         gap = rng.standard_exponential() / world.hazard
         # Written so that infinity and NaN (p = 0) end the noise as well.
-        if not gap < n_bits - position - 1:
-            return position, n_events, True
-        position += 1 + int(gap)
-        # Unsigned: a signed division that rounds down costs three times as much.
-        t = np.int64(np.uint64(position) // n_inputs)
-        channels[n_events] = position - t * world.n_inputs
-        offsets[bin_ + t + 1] += 1
-        n_events += 1
-    return position, n_events, False
+        done = not gap < n_bits - position - 1
+        if not done:
+            position += 1 + int(gap)
+            # Unsigned: a signed division that rounds down costs three times as much.
+            t = np.int64(np.uint64(position) // n_inputs)
+            channels[n_events] = position - t * world.n_inputs
+            offsets[bin_ + t + 1] += 1
+            n_events += 1
+    if done:
+        _accumulate(offsets, bin_, n_bins)
+    return position, n_events, done
 
 
 @compiled
@@ -125,8 +115,17 @@ def append_pattern(
     """Append one occurrence of pattern `class_`, its first bin being bin `bin_`."""
     offsets = grown(offsets, bin_ + world.pattern_bins + 1)
     channels = grown(channels, offsets[bin_] + _pattern_spikes(world, class_))
-    _pattern_into(rng, world, class_, channels, offsets, bin_)
+    if _is_noisy(world):
+        _fill_noisy_pattern(rng, world, class_, channels, offsets, bin_)
+    else:
+        _fill_pattern(world, class_, channels, offsets, bin_)
     return channels, offsets
+
+
+@compiled
+def _is_noisy(world: World) -> bool:
+    """Whether occurrences differ from their pattern."""
+    return world.jitter_bins > 0 or world.deletion > 0.0
 
 
 @compiled
@@ -137,7 +136,26 @@ def _pattern_spikes(world: World, class_: int) -> int:
 
 
 @compiled
-def _pattern_into(
+def _fill_pattern(
+    world: World,
+    class_: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> None:
+    """`append_pattern` without noise on it, where both buffers are long enough."""
+    bins = world.pattern_bins
+    first = world.pattern_offsets[class_ * bins]
+    last = world.pattern_offsets[(class_ + 1) * bins]
+    n_events = offsets[bin_]
+    for e in range(first, last):
+        channels[n_events + e - first] = world.pattern_channels[e]
+    for m in range(1, bins + 1):
+        offsets[bin_ + m] = n_events + world.pattern_offsets[class_ * bins + m] - first
+
+
+@compiled
+def _fill_noisy_pattern(
     rng: Generator,
     world: World,
     class_: int,
@@ -145,20 +163,10 @@ def _pattern_into(
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
-    """`append_pattern` where both buffers are long enough."""
-    bins = world.pattern_bins
-    first = world.pattern_offsets[class_ * bins]
-    last = world.pattern_offsets[(class_ + 1) * bins]
+    """`append_pattern` with noise on it, where both buffers are long enough."""
     n_events = offsets[bin_]
-    if world.jitter_bins == 0 and world.deletion == 0.0:
-        for e in range(first, last):
-            channels[n_events + e - first] = world.pattern_channels[e]
-        for m in range(1, bins + 1):
-            offsets[bin_ + m] = n_events + world.pattern_offsets[class_ * bins + m] - first
-        return
-
     cells = _noisy_cells(rng, world, class_)
-    for m in range(1, bins + 1):
+    for m in range(1, world.pattern_bins + 1):
         offsets[bin_ + m] = 0
     for k in range(cells.size):
         # Two spikes moved onto one cell are one spike: the raster stays binary.
@@ -168,7 +176,7 @@ def _pattern_into(
         channels[n_events] = cells[k] - m * world.n_inputs
         n_events += 1
         offsets[bin_ + m + 1] += 1
-    _accumulate(offsets, bin_, bins)
+    _accumulate(offsets, bin_, world.pattern_bins)
 
 
 @compiled
@@ -242,31 +250,76 @@ def append_trial(
         end += count
     _sort(onsets, occurrence, end)
 
-    # Room for everything but an unusual amount of noise, so that buffers are seldom replaced.
     n_bins = world.background_bins + (end - occurrence) * world.pattern_bins
-    offsets = grown(offsets, bin_ + n_bins + 1)
-    noise = -np.expm1(-world.hazard) * world.background_bins * world.n_inputs
-    events = offsets[bin_] + int(noise + 6.0 * np.sqrt(noise)) + 16
-    for k in range(occurrence, end):
-        class_ = onsets[k] % world.n_classes
-        events += _pattern_spikes(world, class_)
-    channels = grown(channels, events)
-    t = bin_
-    noise_done = 0
-    for k in range(occurrence, end):
-        before = onsets[k] // world.n_classes
-        class_ = onsets[k] - before * world.n_classes
-        if before > noise_done:
-            channels = _noise_into(rng, world, before - noise_done, channels, offsets, t)
-            t += before - noise_done
-            noise_done = before
-        onsets[k] = t - bin_
-        classes[k] = class_
-        _pattern_into(rng, world, class_, channels, offsets, t)
-        t += world.pattern_bins
-    channels = _noise_into(rng, world, world.background_bins - noise_done, channels, offsets, t)
-    t += world.background_bins - noise_done
+    if bin_ + n_bins >= offsets.size:
+        offsets = grown(offsets, bin_ + n_bins + 1)
+    k, noise_done, position, t, n_events, missing = _fill_trial(
+        rng, world, channels, offsets, onsets, classes, bin_, end,
+        occurrence, 0, -1, bin_, offsets[bin_],
+    )  # fmt: skip
+    while missing > 0:
+        channels = grown(channels, channels.size + missing)
+        k, noise_done, position, t, n_events, missing = _fill_trial(
+            rng, world, channels, offsets, onsets, classes, bin_, end,
+            k, noise_done, position, t, n_events,
+        )  # fmt: skip
     return channels, offsets, onsets, classes, t, end, label
+
+
+@compiled
+def _fill_trial(
+    rng: Generator,
+    world: World,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    bin_: int,
+    end: int,
+    k: int,
+    noise_done: int,
+    position: int,
+    t: int,
+    n_events: int,
+) -> tuple[int, int, int, int, int, int]:
+    """Lay out a trial from bin `t` and occurrence `k` on, until its end or that of `channels`.
+
+    Takes and returns how far it has got, so that it can go on in a longer buffer: the occurrence,
+    the noise bins done, the last 1 in the present noise (−1: none yet), the bin and the number of
+    spikes; and the number of spikes for which there was no room (0: all is done). No buffer changes
+    hands here, which numba would count each time at the cost of several spikes.
+    """
+    missing = -1
+    while missing < 0:
+        before = onsets[k] // world.n_classes if k < end else world.background_bins
+        if before > noise_done:
+            position, n_events, done = _fill_noise(
+                rng, world, before - noise_done, channels, offsets, t, position, n_events
+            )
+            if done:
+                t += before - noise_done
+                noise_done = before
+                position = -1
+            else:
+                missing = 1
+        elif k == end:
+            missing = 0
+        else:
+            class_ = onsets[k] - before * world.n_classes
+            n_spikes = _pattern_spikes(world, class_)
+            if n_events + n_spikes > channels.size:
+                missing = n_spikes
+            else:
+                onsets[k] = t - bin_
+                classes[k] = class_
+                if _is_noisy(world):
+                    _fill_noisy_pattern(rng, world, class_, channels, offsets, t)
+                else:
+                    _fill_pattern(world, class_, channels, offsets, t)
+                t += world.pattern_bins
+                n_events = offsets[t]
+                k += 1
+    return k, noise_done, position, t, n_events, missing
 
 
 @compiled
