@@ -113,12 +113,12 @@ def draw_potential(axes: Axes, trial: Trial, agent: Any) -> None:
     top = max(float(recording.X.max()), threshold) * 1.12
     if graded:
         over = recording.X >= threshold
-        axes.fill_between(t, 0.0, recording.X, where=over, step="mid", color="#D55E00", lw=0)
+        axes.bar(t[over], recording.X[over], width=1.0, color="#D55E00", alpha=0.6, lw=0)
     else:
         spikes = t[recording.spikes]
         axes.plot(spikes, np.full(len(spikes), top), "v", color="#D55E00", markersize=5)
     axes.set(
-        ylabel="V, output S shaded" if graded else "readout, spikes (▾)",
+        ylabel="V, bins with output S shaded" if graded else "readout, spikes (▾)",
         ylim=(min(0.0, float(recording.X.min())), top * 1.08),
     )
 
