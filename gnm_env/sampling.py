@@ -29,7 +29,9 @@ def grown(buffer: NDArray[Any], needed: int) -> NDArray[Any]:
     if needed <= buffer.size:
         return buffer
     longer = np.empty(max(needed, 2 * buffer.size), buffer.dtype)
-    longer[: buffer.size] = buffer
+    # A loop: copying by slice would compile NumPy's message about shapes, for 2 s.
+    for i in range(buffer.size):
+        longer[i] = buffer[i]
     return longer
 
 
@@ -199,22 +201,25 @@ def _noisy_cells(rng: Generator, world: World, class_: int) -> NDArray[np.int64]
                 moved = min(max(moved, 0), bins - 1)
             cells[kept] = moved * world.n_inputs + world.pattern_channels[e]
             kept += 1
-    return np.sort(cells[:kept])
+    _sort(cells, 0, kept)
+    return cells[:kept]
 
 
 @compiled
 def _sort(values: NDArray[np.int64], start: int, stop: int) -> None:
-    """Sort values[start:stop] in place; few values, as trials have, without any allocation."""
-    if stop - start > 64:
-        values[start:stop] = np.sort(values[start:stop])
-        return
-    for k in range(start + 1, stop):
-        value = values[k]
-        place = k
-        while place > start and values[place - 1] > value:
-            values[place] = values[place - 1]
-            place -= 1
-        values[place] = value
+    """Sort values[start:stop] in place (Shell's way), without any allocation."""
+    gap = 1
+    while gap < (stop - start) // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for k in range(start + gap, stop):
+            value = values[k]
+            place = k
+            while place >= start + gap and values[place - gap] > value:
+                values[place] = values[place - gap]
+                place -= gap
+            values[place] = value
+        gap //= 3
 
 
 @compiled
