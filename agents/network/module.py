@@ -141,10 +141,7 @@ class NetworkModule(nn.Module):
         # Not relu: its result for NaN depends on the device.
         ratio = torch.where(v <= 0, torch.zeros_like(v), v / self.network.theta_b)
         ratio = ratio.clamp(max=largest_ratio(h))
-        if h == 4.0:
-            power = ratio * ratio * ratio * ratio
-        else:
-            power = ratio**h
+        power = ratio**h
         return power / (1 + power)
 
     @staticmethod
