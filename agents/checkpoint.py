@@ -179,6 +179,6 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
 def _generator(state: dict[str, Any] | None) -> Generator | None:
     if state is None:
         return None
-    bit_generator = _BIT_GENERATORS[state["bit_generator"]]()
+    bit_generator: Any = _BIT_GENERATORS[state["bit_generator"]]()
     bit_generator.state = state
     return Generator(bit_generator)

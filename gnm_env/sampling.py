@@ -87,9 +87,9 @@ def _fill_noise(
         if not done:
             position += 1 + int(gap)
             # Unsigned: a signed division that rounds down costs three times as much.
-            t = np.int64(np.uint64(position) // n_inputs)
-            channels[n_events] = position - t * world.n_inputs
-            offsets[bin_ + t + 1] += 1
+            noise_bin = np.int64(np.uint64(position) // n_inputs)
+            channels[n_events] = position - noise_bin * world.n_inputs
+            offsets[bin_ + noise_bin + 1] += 1
             n_events += 1
     if done:
         _accumulate(offsets, bin_, n_bins)

@@ -130,7 +130,12 @@ def _protocol(part: str) -> dict[str, Any]:
     if part == "neurons":
         from agents.network import BackPropagation, Network
 
-        kinds = [*NEURONS.items(), *RULES.items(), ("network", Network), ("bp", BackPropagation)]
+        kinds: list[tuple[str, Any]] = [
+            *NEURONS.items(),
+            *RULES.items(),
+            ("network", Network),
+            ("bp", BackPropagation),
+        ]
         defaults = {name: asdict(kind()) for name, kind in kinds}
     else:
         from agents.rl import RECIPES
