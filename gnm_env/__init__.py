@@ -19,9 +19,14 @@ __all__ = [
     "draw_trial",
 ]
 
-register("gnm/PatternTrial-v0", entry_point="gnm_env.trial_env:PatternTrialEnv")
+register(
+    "gnm/PatternTrial-v0",
+    entry_point="gnm_env.trial_env:PatternTrialEnv",
+    vector_entry_point="gnm_env.vector_env:PatternTrialVectorEnv",
+)
 register(
     "gnm/PatternStream-v0",
     entry_point="gnm_env.stream_env:PatternStreamEnv",
+    vector_entry_point="gnm_env.vector_env:PatternStreamVectorEnv",
     max_episode_steps=MAX_EPISODE_BINS,
 )

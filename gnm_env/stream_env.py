@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gnm_env.compiled import compiled
 from gnm_env.pattern_env import PatternEnv, spike_from
 from gnm_env.sampling import append_piece, new_buffers
+from gnm_env.scoring import MISTAKES, mistake_in_pattern
 from gnm_env.task import Patterns, Task, World, dense
 
 MAX_EPISODE_BINS = 10_000
@@ -116,9 +117,9 @@ class PatternStreamEnv(PatternEnv):
         in_noise = len(self._ahead) >= self._pattern_bins
         if self._scroll is not None:
             self._show(action)
-        mistake = ("noise" if action else "") if in_noise else self._mistake(action)
+        mistake = action if in_noise else self._mistake(action)
         if mistake:
-            info = {"mistake": mistake, "class": -1 if in_noise else self._class}
+            info = {"mistake": MISTAKES[mistake], "class": -1 if in_noise else self._class}
             self._running = False
         if not self._ahead:
             self._next_piece()
@@ -126,13 +127,10 @@ class PatternStreamEnv(PatternEnv):
             return self._ahead.pop(), 0.0, True, False, info
         return self._ahead.pop(), 1.0, False, False, {}
 
-    def _mistake(self, spike: int) -> str:
-        """What is wrong with the answer to a bin of an occurrence; empty if nothing is."""
+    def _mistake(self, spike: int) -> int:
+        """Number of the mistake in answering a bin of an occurrence with `spike`; 0 if none."""
         self._count += spike
-        owed = self.task.owed[self._class]
-        if self._count > owed:
-            return "too many"
-        return "too few" if not self._ahead and self._count < owed else ""
+        return mistake_in_pattern(self._count, self.task.owed[self._class], not self._ahead)
 
     def _show(self, spike: int) -> None:
         """Show the picture the bin shown last and the answer to it."""

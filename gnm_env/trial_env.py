@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gnm_env.checks import choice, real
 from gnm_env.pattern_env import PatternEnv, spike_from
+from gnm_env.scoring import reward_for
 from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_next
 
@@ -142,7 +143,8 @@ class PatternTrialEnv(PatternEnv):
         if ahead:
             return row, reward, False, False, {}
         if self.feedback != "dense":
-            reward = self._aggregate_feedback()
+            error = float(self.trial.label - self._emitted)
+            reward = reward_for(error, self.tolerance, self.feedback == "sign")
         return row, reward, True, False, self._terminal_info()
 
     def _amount_from(self, action: Any) -> float:
@@ -171,16 +173,9 @@ class PatternTrialEnv(PatternEnv):
         self._in_occurrence += output
         if t + 1 < self.trial.onsets[owner] + self.trial.pattern_bins:
             return 0.0
-        error = self._beyond_tolerance(float(self.trial.targets[owner]) - self._in_occurrence)
+        error = float(self.trial.targets[owner]) - self._in_occurrence
         self._in_occurrence = 0
-        return 0.0 - abs(error)
-
-    def _beyond_tolerance(self, error: float) -> float:
-        return error if abs(error) > self.tolerance else 0.0
-
-    def _aggregate_feedback(self) -> float:
-        error = self._beyond_tolerance(float(self.trial.label - self._emitted))
-        return float(np.sign(error)) if self.feedback == "sign" else 0.0 - abs(error)
+        return reward_for(error, self.tolerance, sign_only=False)
 
     def _terminal_info(self) -> dict[str, Any]:
         trial = self.trial

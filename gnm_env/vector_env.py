@@ -1,0 +1,511 @@
+"""Both environments as native vector environments: many copies, one compiled call a step."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from gnm_env.checks import choice, real, whole
+from gnm_env.generators import Generators
+from gnm_env.sampling import PIECE_BINS
+from gnm_env.scoring import MISTAKES
+from gnm_env.task import Patterns, Task, world
+from gnm_env.trial_env import FEEDBACK, OUTPUT
+from gnm_env.vector_kernels import (
+    COST,
+    DISABLED,
+    NEXT_STEP,
+    SAME_STEP,
+    STREAM_STATE,
+    TRIAL_STATE,
+    begin_streams,
+    begin_trials,
+    clear_rows,
+    event_shift,
+    new_crowd,
+    step_streams,
+    step_trials,
+)
+
+NO_LIMIT = 2**30
+AUTORESET = {
+    AutoresetMode.NEXT_STEP: NEXT_STEP,
+    AutoresetMode.SAME_STEP: SAME_STEP,
+    AutoresetMode.DISABLED: DISABLED,
+}
+
+Bits = NDArray[np.int8]
+Seeds = int | list[int | None] | None
+Step = tuple[Bits, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+
+
+class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
+    """Base of the vector environments: what they have in common, and the manual of that.
+
+    ## Seeding
+    After `reset(seed=s)` environment i hears what the single environment hears after
+    `reset(seed=s + i)`. A list holds one seed per environment, None where the generator goes on.
+    Each environment draws from a generator of its own, in the order of the single environment: its
+    rollout is that of the single environment, whatever the others do.
+
+    ## Autoreset
+    `autoreset_mode`, also in `metadata["autoreset_mode"]`, is NEXT_STEP (the step after the end of
+    an episode ignores the action and returns the first observation of the next), SAME_STEP (the
+    step that ends an episode returns it, and `info` has `final_obs` and `final_info`) or DISABLED
+    (ended environments must be reset before the next step). `reset(options={"reset_mask": mask})`
+    resets those environments where the bool array `mask` is True, in any mode.
+
+    ## Observations
+    int8 (num_envs, N). With `copy=True` a new array each time. With `copy=False` always the same
+    array, which the next call overwrites: faster, for those who use or copy it at once.
+
+    ## Info
+    As Gymnasium's SyncVectorEnv has it: for each key an array over environments, and under `_key` a
+    bool array that tells where it holds. Lists stand in object arrays.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: Task,
+        patterns: Patterns | None,
+        pattern_seed: int,
+        action_space: spaces.Space[Any],
+        max_episode_steps: int | None,
+        autoreset_mode: AutoresetMode | str,
+        copy: bool,
+        render_mode: str | None,
+    ) -> None:
+        self.num_envs = whole("num_envs", num_envs, low=1)
+        self.task = task
+        self.patterns = Patterns.draw(task, pattern_seed) if patterns is None else patterns
+        self._world = world(task, self.patterns)
+        if render_mode is not None:
+            raise ValueError(
+                f"render_mode must be None, got {render_mode!r}: many environments at once draw no "
+                "pictures; use gymnasium.make or vectorization_mode='sync'"
+            )
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self._by_hand = self.autoreset_mode == AutoresetMode.DISABLED
+        self.copy = bool(copy)
+        self._limit = NO_LIMIT
+        if max_episode_steps is not None:
+            self._limit = min(NO_LIMIT, whole("max_episode_steps", max_episode_steps, low=1))
+        self.single_observation_space = spaces.Box(0, 1, (task.n_inputs,), np.int8)
+        self.single_action_space = action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(action_space, self.num_envs)
+
+        self._observations = np.zeros((self.num_envs, task.n_inputs), np.int8)
+        self._finals = np.zeros_like(self._observations)
+        self._over = np.zeros(self.num_envs, np.int64)
+        self._n_over = 0
+        self._generators: Generators | None = None
+        self._seeds: list[int | None] = []
+        self._crowd: Any = None
+
+    def _new_crowd(
+        self,
+        state: NDArray[Any],
+        emitted: NDArray[Any],
+        most: float,
+        feedback: int = COST,
+        tolerance: float = 0.0,
+    ) -> Any:
+        return new_crowd(
+            self._seeded().held,
+            self._world,
+            AUTORESET[self.autoreset_mode],
+            self._limit,
+            most,
+            feedback,
+            tolerance,
+            state,
+            emitted,
+            np.zeros((self.num_envs, 8), self._event_type()),
+            self._observations,
+            self._over,
+            self._finals,
+        )
+
+    def _event_type(self) -> type[np.signedinteger[Any]]:
+        """The smallest type that holds the last bin of what is drawn, with a channel."""
+        bits = event_shift(self.task.n_inputs) + math.ceil(math.log2(self._most_bins() + 2))
+        return np.int32 if bits < 32 else np.int64
+
+    # What the two kinds of environment do each in its own way.
+
+    def _most_bins(self) -> float:
+        """No trial, or piece of a stream, is ever longer."""
+        raise NotImplementedError
+
+    def _begin(self, which: NDArray[np.int64]) -> None:
+        """Begin an episode in the environments `which`, whose rows are clear."""
+        raise NotImplementedError
+
+    def _reseeded(self, i: int) -> None:
+        """Environment `i` has a new generator."""
+
+    # Random numbers
+
+    @property
+    def np_random(self) -> Any:
+        """The generator of each environment, in a tuple."""
+        return tuple(self._seeded().rngs)
+
+    @np_random.setter
+    def np_random(self, value: Any) -> None:
+        raise AttributeError("each environment has its own generator; use reset(seed=…)")
+
+    @property
+    def np_random_seed(self) -> Any:
+        """The seed of each environment's generator, in a tuple."""
+        self._seeded()
+        return tuple(self._seeds)
+
+    def _seeded(self) -> Generators:
+        """The generators, with seeds from the operating system if none were given yet."""
+        if self._generators is None:
+            drawn = [seeding.np_random() for _ in range(self.num_envs)]
+            self._seeds = [seed for _, seed in drawn]
+            self._generators = Generators(rng for rng, _ in drawn)
+        return self._generators
+
+    def _seed(self, seed: Seeds, which: NDArray[np.int64]) -> None:
+        """New generators for the environments `which` that are given a seed."""
+        if seed is None:
+            return
+        seeds = self._seed_of_each(seed)
+        generators = self._seeded()
+        for i in which:
+            if seeds[i] is not None:
+                rng, self._seeds[i] = seeding.np_random(seeds[i])
+                generators.replace(i, rng)
+                self._reseeded(i)
+
+    def _seed_of_each(self, seed: int | list[int | None]) -> list[int | None]:
+        try:
+            first = operator.index(seed)  # type: ignore[arg-type]
+        except TypeError:
+            seeds = [None if one is None else int(one) for one in seed]  # type: ignore[union-attr]
+            if len(seeds) != self.num_envs:
+                raise ValueError(
+                    "seed must be a whole number or one seed per environment, "
+                    f"num_envs = {self.num_envs}, got {len(seeds)} seeds"
+                ) from None
+            return seeds
+        return [first + i for i in range(self.num_envs)]
+
+    # Reset and step
+
+    def reset(
+        self, *, seed: Seeds = None, options: dict[str, Any] | None = None
+    ) -> tuple[Bits, dict[str, Any]]:
+        """Begin an episode in every environment, or in those of `options["reset_mask"]`.
+
+        `seed` is that of environment 0, the others counting up, or a list; see the class.
+        """
+        mask = self._mask(options)
+        which = np.flatnonzero(mask)
+        self._seed(seed, which)
+        if self._crowd is not None:
+            clear_rows(self._crowd, mask)
+        self._begin(which)
+        self._n_over = int(np.count_nonzero(~mask[self._over[: self._n_over]]))
+        return self._seen(), {}
+
+    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        """Where to reset."""
+        unknown = sorted(set(options or {}) - {"reset_mask"})
+        if unknown:
+            raise ValueError(f"unknown reset option {unknown[0]!r}; known options: 'reset_mask'")
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, np.bool_)
+        wrong = not isinstance(mask, np.ndarray) or mask.dtype != np.bool_
+        if wrong or mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(
+                f"options['reset_mask'] must be a bool array of shape ({self.num_envs},) with at "
+                f"least one True, got {mask!r}"
+            )
+        if self._crowd is None:
+            raise ResetNeeded("call reset() once for all environments before using 'reset_mask'")
+        return mask
+
+    def _seen(self) -> Bits:
+        return self._observations.copy() if self.copy else self._observations
+
+    def _require_reset(self) -> None:
+        if self._crowd is None:
+            raise ResetNeeded("call reset() before step()")
+        if self._n_over and self._by_hand:
+            raise ResetNeeded(
+                f"environment {self._over[0]} has ended and autoreset is disabled: call "
+                "reset(options={'reset_mask': mask}) before step()"
+            )
+
+    def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
+        checked = np.asarray(actions)
+        if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
+            raise ValueError(
+                f"actions must be whole numbers of shape ({self.num_envs},), one per environment, "
+                f"got {checked.dtype} of shape {checked.shape}"
+            )
+        return np.ascontiguousarray(checked, np.int64)
+
+    def _no_spike(self, actions: NDArray[Any], bad: int) -> ValueError:
+        return ValueError(
+            f"action must be 0 (silent) or 1 (spike), got {np.asarray(actions)[bad]!r} "
+            f"for environment {bad}"
+        )
+
+    def _info(self, terminal: dict[str, Any]) -> dict[str, Any]:
+        """`terminal`, the info of what has ended, in the form that the autoreset mode asks for."""
+        if self.autoreset_mode != AutoresetMode.SAME_STEP:
+            return terminal
+        over = self._over[: self._n_over]
+        final_obs = np.empty(self.num_envs, object)
+        for i, row in zip(over.tolist(), self._finals[: self._n_over].copy(), strict=True):
+            final_obs[i] = row
+        mask = np.zeros(self.num_envs, np.bool_)
+        mask[over] = True
+        return {
+            "final_obs": final_obs,
+            "_final_obs": mask,
+            "final_info": terminal,
+            "_final_info": mask.copy(),
+        }
+
+
+class PatternTrialVectorEnv(PatternVectorEnv):
+    """`gnm/PatternTrial-v0` many times over; see `PatternTrialEnv` for the task itself.
+
+    Made by `gymnasium.make_vec("gnm/PatternTrial-v0", num_envs)`. Takes the arguments of the single
+    environment but for `render_mode`, and `autoreset_mode`, `copy` and `max_episode_steps`. See
+    `PatternVectorEnv` for seeding, autoreset, observations and `info`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        task: Task | None = None,
+        patterns: Patterns | None = None,
+        feedback: str = "cost",
+        *,
+        pattern_seed: int = 0,
+        output: str = "spikes",
+        max_output: float = 100.0,
+        tolerance: float = 0.0,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        render_mode: str | None = None,
+        **task_fields: Any,
+    ) -> None:
+        self.feedback = choice("feedback", feedback, FEEDBACK)
+        self.output = choice("output", output, OUTPUT)
+        self.max_output = real("max_output", max_output, above=0.0)
+        self.tolerance = real("tolerance", tolerance, low=0.0)
+        self._graded = self.output == "graded"
+        amounts = spaces.Box(0.0, self.max_output, (1,), np.float64)
+        super().__init__(
+            num_envs,
+            Task.from_keywords(task, task_fields),
+            patterns,
+            pattern_seed,
+            amounts if self._graded else spaces.Discrete(2),
+            max_episode_steps,
+            autoreset_mode,
+            copy,
+            render_mode,
+        )
+        self._emitted = np.zeros(self.num_envs, np.float64 if self._graded else np.int64)
+        self._report = np.zeros(64, np.int64)
+        self._clean_results()
+
+    def _clean_results(self) -> None:
+        """New arrays for labels and outputs; the old ones now belong to the caller of `step`."""
+        self._labels = np.zeros(self.num_envs, np.int64)
+        self._outputs = np.zeros_like(self._emitted)
+
+    def _most_bins(self) -> float:
+        # A Poisson number exceeds this with a probability below 1e-80.
+        mean = self.task.n_classes * self.task.mean_occurrences
+        most_occurrences = mean + 20.0 * math.sqrt(mean) + 60.0
+        return self.task.background_bins + self.task.pattern_bins * most_occurrences
+
+    def _begin(self, which: NDArray[np.int64]) -> None:
+        if self._crowd is None:
+            self._crowd = self._new_crowd(
+                np.zeros(self.num_envs, TRIAL_STATE),
+                self._emitted,
+                self.max_output if self._graded else 1.0,
+                FEEDBACK.index(self.feedback),
+                self.tolerance,
+            )
+        begin_trials(self._crowd, which)
+
+    def step(self, actions: NDArray[Any]) -> Step:
+        self._require_reset()
+        n = self.num_envs
+        rewards, terminated, truncated = np.zeros(n), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+        answers = self._amounts(actions) if self._graded else self._spikes(actions)
+        bad, self._n_over, length, self._report = step_trials(
+            self._crowd,
+            answers,
+            rewards,
+            terminated,
+            truncated,
+            self._labels,
+            self._outputs,
+            self._report,
+        )
+        if bad >= 0:
+            raise self._no_amount(actions, bad) if self._graded else self._no_spike(actions, bad)
+        info: dict[str, Any] = {}
+        if self._n_over:
+            info = self._info(self._terminal_info(terminated, length))
+        return self._seen(), rewards, terminated, truncated, info
+
+    def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
+        checked = np.asarray(actions)
+        if checked.shape != (self.num_envs, 1) or checked.dtype.kind not in "fiub":
+            raise ValueError(
+                f"actions must be numbers of shape ({self.num_envs}, 1), one per environment, "
+                f"got {checked.dtype} of shape {checked.shape}"
+            )
+        return np.ascontiguousarray(checked[:, 0], np.float64)
+
+    def _no_amount(self, actions: NDArray[Any], bad: int) -> ValueError:
+        return ValueError(
+            f"action must be one amount in 0 … {self.max_output:g} (max_output), "
+            f"got {np.asarray(actions)[bad, 0]!r} for environment {bad}"
+        )
+
+    def _terminal_info(self, terminated: NDArray[np.bool_], length: int) -> dict[str, Any]:
+        if length == 0:  # truncated only
+            return {}
+        labels, outputs = self._labels, self._outputs
+        self._clean_results()
+        n = self.num_envs
+        onsets, classes, targets = np.empty((3, n), object)
+        pattern_bins = np.zeros(n, np.int64)
+        numbers = self._report[:length].tolist()
+        at = 0
+        while at < length:
+            i, k = numbers[at], numbers[at + 1]
+            first, second, third = at + 2, at + 2 + k, at + 2 + 2 * k
+            at = third + k
+            onsets[i] = numbers[first:second]
+            classes[i] = numbers[second:third]
+            targets[i] = numbers[third:at]
+            pattern_bins[i] = self.task.pattern_bins
+        return {
+            "label": labels,
+            "_label": terminated.copy(),
+            "emitted": outputs,
+            "_emitted": terminated.copy(),
+            "onsets": onsets,
+            "_onsets": terminated.copy(),
+            "classes": classes,
+            "_classes": terminated.copy(),
+            "targets": targets,
+            "_targets": terminated.copy(),
+            "pattern_bins": pattern_bins,
+            "_pattern_bins": terminated.copy(),
+        }
+
+
+class PatternStreamVectorEnv(PatternVectorEnv):
+    """`gnm/PatternStream-v0` many times over; see `PatternStreamEnv` for the task itself.
+
+    Made by `gymnasium.make_vec("gnm/PatternStream-v0", num_envs)`. Takes the arguments of the
+    single environment but for `render_mode`, and `autoreset_mode`, `copy` and `max_episode_steps`
+    (`make_vec` sets it to 10,000). See `PatternVectorEnv` for seeding, autoreset, observations and
+    `info`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        task: Task | None = None,
+        patterns: Patterns | None = None,
+        *,
+        pattern_seed: int = 0,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        render_mode: str | None = None,
+        **task_fields: Any,
+    ) -> None:
+        super().__init__(
+            num_envs,
+            Task.from_keywords(task, task_fields),
+            patterns,
+            pattern_seed,
+            spaces.Discrete(2),
+            max_episode_steps,
+            autoreset_mode,
+            copy,
+            render_mode,
+        )
+        self._state = np.zeros(self.num_envs, STREAM_STATE)
+        self._state["anew"] = 1
+        self._mistakes = np.zeros(self.num_envs, np.int64)
+        self._classes = np.zeros(self.num_envs, np.int64)
+
+    def _most_bins(self) -> float:
+        return PIECE_BINS + self.task.pattern_bins
+
+    def _reseeded(self, i: int) -> None:
+        self._state[i]["anew"] = 1
+
+    def _begin(self, which: NDArray[np.int64]) -> None:
+        if self._crowd is None:
+            self._crowd = self._new_crowd(self._state, np.zeros(0, np.int64), most=1.0)
+        begin_streams(self._crowd, which)
+
+    def step(self, actions: NDArray[Any]) -> Step:
+        self._require_reset()
+        n = self.num_envs
+        rewards, terminated, truncated = np.empty(n), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+        bad, self._n_over = step_streams(
+            self._crowd,
+            self._spikes(actions),
+            rewards,
+            terminated,
+            truncated,
+            self._mistakes,
+            self._classes,
+        )
+        if bad >= 0:
+            raise self._no_spike(actions, bad)
+        info: dict[str, Any] = {}
+        if self._n_over:
+            info = self._info(self._terminal_info(terminated))
+        return self._seen(), rewards, terminated, truncated, info
+
+    def _terminal_info(self, terminated: NDArray[np.bool_]) -> dict[str, Any]:
+        which = np.flatnonzero(terminated)
+        if len(which) == 0:  # truncated only
+            return {}
+        classes, self._classes = self._classes, np.zeros(self.num_envs, np.int64)
+        names = np.empty(self.num_envs, object)
+        for i, mistake in zip(which.tolist(), self._mistakes[which].tolist(), strict=True):
+            names[i] = MISTAKES[mistake]
+        return {
+            "mistake": names,
+            "_mistake": terminated.copy(),
+            "class": classes,
+            "_class": terminated.copy(),
+        }

@@ -1,0 +1,523 @@
+"""Compiled steps of the vector environments: one call for all environments and everything in them.
+
+Most bins hold no spike, so that most environments have little to do in a step: their bins and their
+output are counted on, all at once. `clock` has a row for each number that this takes, int32
+(4, n): the bin shown, the bin at which the environment needs a look (its next spike, or an end),
+the next of its events, and the bin at which the episode is truncated.
+
+The spikes of an environment wait in its row of `events`. An event is a bin and a channel in one
+number: bin · 2^shift + channel; channel 2^shift − 1 marks the end of what was drawn. Occurrences
+wait in a row of `parts`: first bin · 2^32 + class. A row that proves too short makes all rows
+longer. Every environment draws from a generator of its own: what it hears depends on no others.
+`shown` are the places of all ones in the observations, which the next step clears again.
+
+All of this is in one struct, since an argument costs a compiled call as much as some environments.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.experimental import structref
+from numpy.typing import NDArray
+
+from gnm_env.compiled import compiled
+from gnm_env.sampling import append_piece, append_trial
+from gnm_env.scoring import compiled_mistake_in_pattern, compiled_reward_for
+from gnm_env.task import World
+
+NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2
+COST, SIGN, DENSE = 0, 1, 2
+
+TRIAL_STATE = np.dtype(
+    [
+        ("label", np.int64),
+        ("n_occurrences", np.int64),
+        ("occurrence", np.int64),  # the next occurrence to end, and the output in it so far
+        ("given", np.float64),
+    ]
+)
+
+STREAM_STATE = np.dtype(
+    [
+        ("n_bins", np.int64),  # of the present piece; bins count from its beginning
+        ("n_noise", np.int64),
+        ("class_", np.int64),
+        ("count", np.int64),  # spikes in the present occurrence
+        ("noise_left", np.float64),
+        ("anew", np.int64),  # the generator is new, and so is the stream
+    ]
+)
+
+
+@structref.register
+class CrowdType(types.StructRef):
+    """Numba's type of a Crowd."""
+
+    def preprocess_fields(self, fields: Any) -> Any:
+        return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+
+class Crowd(structref.StructRefProxy):
+    """All that the environments have between steps, for compiled code; made by `new_crowd`."""
+
+
+structref.define_boxing(CrowdType, Crowd)
+structref.define_constructor(
+    Crowd,
+    CrowdType,
+    [
+        "held",  # the generators
+        "world",
+        "autoreset",
+        "limit",  # bins after which an episode is truncated
+        "most",  # greatest action
+        "feedback",
+        "tolerance",
+        "clock",
+        "state",  # TRIAL_STATE or STREAM_STATE (n,)
+        "emitted",  # output in the present trial (n,)
+        "events",  # int32 or int64 (n, width)
+        "shift",
+        "parts",  # int64 (n, width)
+        "observations",  # int8 (n, N)
+        "shown",
+        "n_shown",
+        "over",  # over[:n_over]: the environments that the last step ended
+        "n_over",
+        "finals",  # their last observations, under SAME_STEP
+        "looks",  # room for a number per environment, and one more
+    ],
+)
+
+
+@compiled
+def new_crowd(
+    held: Any,
+    world: World,
+    autoreset: int,
+    limit: int,
+    most: float,
+    feedback: int,
+    tolerance: float,
+    state: Any,
+    emitted: NDArray[Any],
+    events: NDArray[Any],
+    observations: NDArray[np.int8],
+    over: NDArray[np.int64],
+    finals: NDArray[np.int8],
+) -> Any:
+    """A Crowd in which no environment has begun."""
+    n = observations.shape[0]
+    return Crowd(
+        held, world, autoreset, limit, most, feedback, tolerance,
+        np.zeros((4, n), np.int32), state, emitted,
+        events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
+        observations, np.empty(observations.size, np.int64), 0,
+        over, 0, finals, np.empty(n + 1, np.int64),
+    )  # fmt: skip
+
+
+@compiled
+def event_shift(n_inputs: int) -> int:
+    """Bits for a channel in an event; the number that has them all set is no channel."""
+    shift = 1
+    while (1 << shift) - 1 < n_inputs:
+        shift += 1
+    return shift
+
+
+@compiled
+def _widened(rows: NDArray[Any], width: int) -> NDArray[Any]:
+    """`rows` if they hold `width` entries, else a longer copy of them."""
+    if width <= rows.shape[1]:
+        return rows
+    wider = np.empty((rows.shape[0], width + width // 8 + 8), rows.dtype)
+    for k in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            wider[k, j] = rows[k, j]
+    return wider
+
+
+@compiled
+def _store(
+    row: NDArray[Any],
+    shift: int,
+    n_bins: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+) -> None:
+    """Put the spikes of `n_bins` bins into a row of the events, and their end behind them."""
+    n_events = offsets[n_bins]
+    for e in range(n_events):
+        row[e] = 0
+    # Every bin is written to where its spikes begin; an empty one is overwritten by the next, and
+    # further spikes of a bin take the bin of those before. No branch depends on the spikes.
+    for t in range(n_bins):
+        row[offsets[t]] = t
+    bin_ = 0
+    for e in range(n_events):
+        bin_ = max(bin_, row[e])
+        row[e] = (bin_ << shift) + channels[e]
+    row[n_events] = ((n_bins + 1) << shift) - 1
+
+
+@compiled
+def _look(
+    i: int,
+    bins: NDArray[np.int32],
+    due: NDArray[np.int32],
+    cursors: NDArray[np.int32],
+    deadlines: NDArray[np.int32],
+    events: NDArray[Any],
+    shift: int,
+    observations: NDArray[np.int8],
+    shown: NDArray[np.int64],
+    n_shown: int,
+) -> tuple[int, bool]:
+    """Show the spikes of the bin in row `i`, which is clear, and note when to look again.
+
+    Returns the number of ones now shown, and whether what was drawn has come to its end.
+    """
+    end = (1 << shift) - 1
+    cursor = cursors[i]
+    event = events[i, cursor]
+    while event >> shift == bins[i] and event & end != end:
+        channel = event & end
+        observations[i, channel] = 1
+        shown[n_shown] = i * observations.shape[1] + channel
+        n_shown += 1
+        cursor += 1
+        event = events[i, cursor]
+    cursors[i] = cursor
+    due[i] = min(event >> shift, deadlines[i])
+    return n_shown, event >> shift == bins[i]
+
+
+@compiled
+def _clear(crowd: Any) -> None:
+    """Clear all ones."""
+    places = crowd.observations.reshape(-1)
+    for place in crowd.shown[: crowd.n_shown]:
+        places[place] = 0
+    crowd.n_shown = 0
+
+
+@compiled
+def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> None:
+    """Clear the rows `which`, and forget that their environments are over."""
+    n_inputs = crowd.observations.shape[1]
+    n_shown = 0
+    for place in crowd.shown[: crowd.n_shown]:
+        if which[place // n_inputs]:
+            crowd.observations[place // n_inputs, place % n_inputs] = 0
+        else:
+            crowd.shown[n_shown] = place
+            n_shown += 1
+    crowd.n_shown = n_shown
+    n_over = 0
+    for i in crowd.over[: crowd.n_over]:
+        if not which[i]:
+            crowd.over[n_over] = i
+            n_over += 1
+    crowd.n_over = n_over
+
+
+@compiled
+def _set_aside(crowd: Any) -> None:
+    """Move the observations of the environments that are over to `finals`."""
+    for k in range(crowd.n_over):
+        row = crowd.observations[crowd.over[k]]
+        for channel in range(row.size):
+            crowd.finals[k, channel] = row[channel]
+            row[channel] = 0
+
+
+@compiled
+def _first_bad_action(actions: NDArray[Any], most: float, over: NDArray[np.int64]) -> int:
+    """The first environment whose action is not in 0 … `most`, or −1; those `over` do not count."""
+    n_bad = 0
+    for i in range(actions.size):
+        n_bad += not 0 <= actions[i] <= most
+    if n_bad > 0:
+        for i in range(actions.size):
+            if not 0 <= actions[i] <= most and not np.any(over == i):
+                return i
+    return -1
+
+
+@compiled
+def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
+    """Draw a trial for each environment in `which` and show its first bin; their rows are clear."""
+    if which.size == 0:
+        return
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    onsets, classes = np.empty(16, np.int64), np.empty(16, np.int64)
+    held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
+    events, parts, observations, shown = crowd.events, crowd.parts, crowd.observations, crowd.shown
+    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
+    shift, n_shown = crowd.shift, crowd.n_shown
+    for i in which:
+        s = state[i]
+        channels, offsets, onsets, classes, n_bins, s.n_occurrences, s.label = append_trial(
+            held[i], world, channels, offsets, onsets, classes, 0, 0
+        )
+        if offsets[n_bins] >= events.shape[1]:
+            events = _widened(events, offsets[n_bins] + 1)
+        if s.n_occurrences > parts.shape[1]:
+            parts = _widened(parts, s.n_occurrences)
+        _store(events[i], shift, n_bins, channels, offsets)
+        for k in range(s.n_occurrences):
+            parts[i, k] = (onsets[k] << 32) + classes[k]
+        s.occurrence, s.given = 0, 0.0
+        emitted[i] = 0
+        bins[i], cursors[i], deadlines[i] = 0, 0, crowd.limit
+        n_shown, _ = _look(
+            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+        )
+    crowd.events, crowd.parts, crowd.n_shown = events, parts, n_shown
+
+
+@compiled
+def step_trials(
+    crowd: Any,
+    actions: NDArray[Any],
+    rewards: NDArray[np.float64],
+    terminated: NDArray[np.bool_],
+    truncated: NDArray[np.bool_],
+    labels: NDArray[np.int64],
+    outputs: NDArray[Any],
+    report: NDArray[np.int64],
+) -> tuple[int, int, int, NDArray[np.int64]]:
+    """One step of every environment.
+
+    Writes into `rewards`, `terminated` and `truncated`, which are zero, and for environments whose
+    trial has come to its end into `labels` and `outputs`, and into `report`: i, K, then the K
+    onsets, classes and targets.
+
+    Returns the number of the first environment with a bad action (−1: none; else nothing has been
+    done), the number of environments now over, and the length of the report and the report.
+    """
+    bad = _first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
+    if bad >= 0:
+        return bad, crowd.n_over, 0, report
+    _clear(crowd)
+    clock, over, looks, emitted = crowd.clock, crowd.over, crowd.looks, crowd.emitted
+    bins, due, cursors, deadlines = clock[0], clock[1], clock[2], clock[3]
+    if crowd.feedback == DENSE:
+        for i in range(actions.size):
+            rewards[i] = _dense_reward(
+                crowd.state[i], bins[i], actions[i], crowd.world, crowd.parts[i], crowd.tolerance
+            )
+        for i in over[: crowd.n_over]:
+            rewards[i] = 0.0
+    for i in range(actions.size):
+        bins[i] += 1
+        emitted[i] += actions[i]
+    if crowd.autoreset == NEXT_STEP:
+        begin_trials(crowd, over[: crowd.n_over])
+
+    n_looks = 0
+    for i in range(actions.size):
+        looks[n_looks] = i
+        n_looks += bins[i] == due[i]
+    events, shift = crowd.events, crowd.shift
+    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
+    n_over = length = 0
+    for i in looks[:n_looks]:
+        n_shown, ended = _look(
+            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+        )
+        if not ended and bins[i] < deadlines[i]:
+            continue
+        over[n_over] = i
+        n_over += 1
+        truncated[i] = bins[i] == deadlines[i]
+        if ended:
+            s = crowd.state[i]
+            terminated[i] = True
+            labels[i], outputs[i] = s.label, emitted[i]
+            if crowd.feedback != DENSE:
+                rewards[i] = compiled_reward_for(
+                    s.label - emitted[i], crowd.tolerance, crowd.feedback == SIGN
+                )
+            report, length = _reported(
+                report, length, i, crowd.parts[i, : s.n_occurrences], crowd.world.targets
+            )
+    crowd.n_shown, crowd.n_over = n_shown, n_over
+
+    if crowd.autoreset == SAME_STEP:
+        _set_aside(crowd)
+        begin_trials(crowd, over[:n_over])
+        crowd.n_over = 0
+    return -1, n_over, length, report
+
+
+@compiled
+def _dense_reward(
+    s: Any,
+    bin_: int,
+    action: float,
+    world: World,
+    occurrences: NDArray[np.int64],
+    tolerance: float,
+) -> float:
+    """−1 per output in noise, −|target − output| at the end of an occurrence."""
+    if s.occurrence == s.n_occurrences or bin_ < occurrences[s.occurrence] >> 32:
+        return 0.0 - action
+    s.given += action
+    if bin_ + 1 < (occurrences[s.occurrence] >> 32) + world.pattern_bins:
+        return 0.0
+    error = world.targets[occurrences[s.occurrence] & 0xFFFFFFFF] - s.given
+    s.occurrence += 1
+    s.given = 0.0
+    return float(compiled_reward_for(error, tolerance, False))
+
+
+@compiled
+def _reported(
+    report: NDArray[np.int64],
+    length: int,
+    i: int,
+    occurrences: NDArray[np.int64],
+    targets: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], int]:
+    """The report with the occurrences of environment `i` at its end, and its new length."""
+    n = occurrences.size
+    end = length + 2 + 3 * n
+    if end > report.size:
+        longer = np.empty(2 * end, np.int64)
+        for j in range(length):
+            longer[j] = report[j]
+        report = longer
+    report[length] = i
+    report[length + 1] = n
+    at = length + 2
+    for k in range(n):
+        class_ = occurrences[k] & 0xFFFFFFFF
+        report[at + k] = occurrences[k] >> 32
+        report[at + n + k] = class_
+        report[at + 2 * n + k] = targets[class_]
+    return report, end
+
+
+@compiled
+def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
+    """Show the next bin of each stream in `which`, whose rows are clear.
+
+    Where a piece is used up, that is the first of the next piece. With `begin` an episode begins in
+    each: it goes on after the bin shown last or, where that lies in a pattern, after the pattern.
+    """
+    if which.size == 0:
+        return
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    held, world, state, events = crowd.held, crowd.world, crowd.state, crowd.events
+    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
+    shift = crowd.shift
+    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
+    for i in which:
+        s = state[i]
+        if begin and not s.anew and bins[i] < s.n_noise and bins[i] + 1 < s.n_bins:
+            bins[i] += 1
+        else:
+            if s.anew:
+                s.anew, s.noise_left = 0, -1.0
+            channels, offsets, s.n_noise, s.class_, s.noise_left = append_piece(
+                held[i], world, s.noise_left, channels, offsets, 0
+            )
+            s.n_bins = s.n_noise + (world.pattern_bins if s.class_ >= 0 else 0)
+            if offsets[s.n_bins] >= events.shape[1]:
+                events = _widened(events, offsets[s.n_bins] + 1)
+            _store(events[i], shift, s.n_bins, channels, offsets)
+            deadlines[i] -= bins[i]
+            bins[i], cursors[i] = 0, 0
+        s.count = 0
+        if begin:
+            deadlines[i] = bins[i] + crowd.limit
+        n_shown, _ = _look(
+            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+        )
+    crowd.events, crowd.n_shown = events, n_shown
+
+
+@compiled
+def begin_streams(crowd: Any, which: NDArray[np.int64]) -> None:
+    """Begin an episode in each environment in `which` and show its first bin; rows are clear."""
+    _go_on(crowd, which, True)
+
+
+@compiled
+def step_streams(
+    crowd: Any,
+    actions: NDArray[np.int64],
+    rewards: NDArray[np.float64],
+    terminated: NDArray[np.bool_],
+    truncated: NDArray[np.bool_],
+    mistakes: NDArray[np.int64],
+    classes: NDArray[np.int64],
+) -> tuple[int, int]:
+    """One step of every environment; arguments and result as in `step_trials`.
+
+    For environments that made a mistake writes its number into `mistakes` and its class into
+    `classes`.
+    """
+    bad = _first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
+    if bad >= 0:
+        return bad, crowd.n_over
+    _clear(crowd)
+    clock, over, looks = crowd.clock, crowd.over, crowd.looks
+    bins, due, cursors, deadlines = clock[0], clock[1], clock[2], clock[3]
+    for i in range(actions.size):
+        rewards[i] = 1.0
+    if crowd.autoreset == NEXT_STEP:
+        _go_on(crowd, over[: crowd.n_over], True)
+        for i in over[: crowd.n_over]:
+            bins[i] -= 1
+            rewards[i] = 0.0
+    for i in range(actions.size):
+        bins[i] += 1
+
+    n_looks = 0
+    for i in range(actions.size):
+        looks[n_looks] = i
+        n_looks += (bins[i] == due[i]) | ((actions[i] != 0) & (rewards[i] != 0.0))
+    events, shift = crowd.events, crowd.shift
+    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
+    n_over = n_used_up = 0
+    for i in looks[:n_looks]:
+        n_shown, used_up = _look(
+            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+        )
+        if used_up or actions[i] != 0:
+            mistake, class_ = _mistake(crowd.state[i], bins[i], actions[i], crowd.world.targets)
+            if mistake:
+                rewards[i] = 0.0
+                terminated[i] = True
+                mistakes[i], classes[i] = mistake, class_
+        truncated[i] = bins[i] == deadlines[i]
+        if terminated[i] or truncated[i]:
+            over[n_over] = i
+            n_over += 1
+        if used_up:
+            looks[n_used_up] = i  # in the place of one that has been looked at
+            n_used_up += 1
+    crowd.n_shown, crowd.n_over = n_shown, n_over
+
+    _go_on(crowd, looks[:n_used_up], False)
+    if crowd.autoreset == SAME_STEP:
+        _set_aside(crowd)
+        _go_on(crowd, over[:n_over], True)
+        crowd.n_over = 0
+    return -1, n_over
+
+
+@compiled
+def _mistake(s: Any, next_bin: int, spike: int, targets: NDArray[np.int64]) -> tuple[int, int]:
+    """Mistake in answering the bin before `next_bin` with `spike`, and the class (−1: noise)."""
+    if next_bin <= s.n_noise:
+        return spike, -1
+    s.count += spike
+    last_bin = next_bin == s.n_bins
+    return compiled_mistake_in_pattern(s.count, targets[s.class_], last_bin), s.class_
