@@ -105,6 +105,7 @@ def test_interrupted_training_saves_what_there_is(
     result = trained(tmp_path / "run")
     assert result["stopped"] and 100 <= result["trials"] < 300
     assert "go on with --resume" in capsys.readouterr().out
+    monkeypatch.undo()
     trained(tmp_path / "whole", "--trials", str(result["trials"]))
     saved, whole = (load_checkpoint(tmp_path / x / "agent.npz") for x in ("run", "whole"))
     assert np.array_equal(saved.agent.weights, whole.agent.weights)
