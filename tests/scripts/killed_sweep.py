@@ -26,7 +26,7 @@ def start(folder: Path) -> int:
     child = os.fork()
     if child == 0:
         with threads(2) as executor:
-            sweep(toy(seeds=12, pause=0.04), folder, executor)
+            sweep(toy(seeds=36, pause=0.04), folder, executor)
         os._exit(0)
     return child
 
