@@ -336,7 +336,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
     def _clean_results(self) -> None:
         """New arrays for labels and outputs; the old ones now belong to the caller of `step`."""
         self._labels = np.zeros(self.num_envs, np.int64)
-        self._outputs = np.zeros_like(self._emitted)
+        self._outputs = np.zeros(self.num_envs, self._emitted.dtype)
 
     def _most_bins(self) -> float:
         # A Poisson number exceeds this with a probability below 1e-80.

@@ -36,11 +36,14 @@ class PatternVecEnv(VecEnv):
                 "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP"
             )
         self.envs = envs
+        self.spec = envs.spec
         self._actions: NDArray[Any] = np.zeros(0)
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[Any]:
-        # SB3 draws a seed for each environment when it is given one, and None afterwards.
+        if any(self._options):
+            raise ValueError(f"there are no reset options, got {self._options[0]!r}")
+        # `seed` has put a seed for each environment here; without it, all are None.
         seeds: Any = None if self._seeds[0] is None else list(self._seeds)
         observations, _ = self.envs.reset(seed=seeds)
         self._reset_seeds()
@@ -99,12 +102,16 @@ class PatternVecEnv(VecEnv):
 
 
 def _of_one(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """What a vector environment's dict of arrays says of environment `i`."""
+    """What a vector environment's dict of arrays says of environment `i`, in plain Python."""
     return {
-        key: values[i]
+        key: _plain(values[i])
         for key, values in infos.items()
         if not key.startswith("_") and _said(infos.get(f"_{key}"), i)
     }
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _said(mask: Sequence[bool] | None, i: int) -> bool:

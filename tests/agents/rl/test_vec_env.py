@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 import gnm_env  # noqa: F401
@@ -27,10 +28,20 @@ def adapted(id_: str, num_envs: int, **settings: Any) -> PatternVecEnv:
     return PatternVecEnv(envs)
 
 
-@pytest.mark.parametrize("id_", IDS)
-def test_rollouts_equal_those_of_single_environments(id_: str) -> None:
-    ours = adapted(id_, 3, n_classes=2)
-    theirs = DummyVecEnv([lambda: gym.make(id_, n_classes=2)] * 3)
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    (IDS[0], {"n_classes": 2}),
+    (IDS[0], {"feedback": "sign"}),
+    (IDS[0], {"feedback": "dense", "n_classes": 2}),
+    (IDS[0], {"max_episode_steps": 120}),
+    (IDS[1], {"n_classes": 2}),
+    (IDS[1], {"max_episode_steps": 40}),
+]
+
+
+@pytest.mark.parametrize(("id_", "settings"), VARIANTS)
+def test_rollouts_equal_those_of_single_environments(id_: str, settings: dict[str, Any]) -> None:
+    ours = adapted(id_, 3, **settings)
+    theirs = DummyVecEnv([lambda: gym.make(id_, **settings)] * 3)
     for env in (ours, theirs):
         env.seed(11)
     assert np.array_equal(ours.reset(), theirs.reset())
@@ -47,6 +58,7 @@ def test_rollouts_equal_those_of_single_environments(id_: str) -> None:
             assert set(info) == set(expected)
             for key in expected:
                 assert np.array_equal(info[key], expected[key])
+                assert type(info[key]) is type(expected[key])
         assert all(not mine[3][i] for i in np.flatnonzero(~mine[2]))
     assert ended > 5
 
@@ -76,6 +88,55 @@ def test_ppo_learns_on_it_without_complaint() -> None:
     model.learn(512)
     assert model.num_timesteps == 512
     assert len(model.ep_info_buffer) >= 1
+
+
+def test_a_seed_is_used_once_as_everywhere_in_sb3() -> None:
+    env = adapted(IDS[0], 2, rate=0.5)
+    assert env.seed(4) == [4, 5]
+    first = env.reset()
+    assert not np.array_equal(env.reset(), first)
+    env.seed(4)
+    assert np.array_equal(env.reset(), first)
+    env.seed(None)  # drawn at random, different for each environment
+    assert not np.array_equal(env.reset(), first)
+
+
+def test_sb3_scores_a_policy_on_it() -> None:
+    env = VecMonitor(adapted("gnm/PatternStream-v0", 4), info_keywords=("mistake",))
+    env.seed(0)
+    rewards, lengths = evaluate_policy(
+        Silent(), env, n_eval_episodes=40, return_episode_rewards=True
+    )
+    assert [length - 1 for length in lengths] == rewards  # the bin of the mistake pays nothing
+    assert 80 < np.mean(rewards) < 240
+
+
+class Silent:
+    """A policy that never spikes."""
+
+    def predict(
+        self, obs: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        return np.zeros(len(obs), np.int64), state
+
+
+def test_monitors_know_the_environment() -> None:
+    spec = adapted(IDS[1], 2).spec
+    assert spec is not None and spec.id == IDS[1]
+
+
+def test_reset_options_are_refused_and_not_forgotten() -> None:
+    env = adapted(IDS[0], 2)
+    env.set_options({"trial": 1})
+    with pytest.raises(ValueError, match="no reset options"):
+        env.reset()
+
+
+def test_bad_actions_are_refused() -> None:
+    env = adapted(IDS[0], 2)
+    env.reset()
+    with pytest.raises(ValueError, match="action must be 0"):
+        env.step(np.array([0, 2]))
 
 
 def test_another_way_to_reset_is_refused() -> None:
