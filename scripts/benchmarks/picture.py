@@ -86,7 +86,16 @@ def _targets(axes: Any, sought: Sequence[tuple[Row, Target]]) -> None:
         first = next(
             p for p, (row, _) in zip(places, sought, strict=True) if row.section == section
         )
-        axes.text(low / 1.15, first - 0.78, section, fontsize=8, fontweight="bold", va="center")
+        axes.text(
+            low / 1.15,
+            first - 0.78,
+            section,
+            fontsize=8,
+            fontweight="bold",
+            va="center",
+            bbox=WHITE,
+            zorder=4,
+        )
     axes.set_xlabel("times the target (dashed), further right is better; line: all repeats")
     axes.tick_params(axis="y", length=0)
     ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if low / 1.2 <= t <= high * 1.2]
