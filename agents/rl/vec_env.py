@@ -38,6 +38,7 @@ class PatternVecEnv(VecEnv):
         self.envs = envs
         self.spec = envs.spec
         self._actions: NDArray[Any] = np.zeros(0)
+        self._empty: list[dict[str, Any]] = [{} for _ in range(envs.num_envs)]
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> NDArray[Any]:
@@ -57,12 +58,20 @@ class PatternVecEnv(VecEnv):
     def step_wait(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], list[dict[str, Any]]]:
         observations, rewards, terminated, truncated, told = self.envs.step(self._actions)
         over = terminated | truncated
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos = self._empty_infos()
         for i in np.flatnonzero(over).tolist():
-            infos[i] = _of_one(told["final_info"], i)
-            infos[i]["terminal_observation"] = told["final_obs"][i]
-            infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
+            infos[i] = {
+                **_of_one(told["final_info"], i),
+                "terminal_observation": told["final_obs"][i],
+                "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+            }
         return self._own(observations), rewards.astype(np.float32), over, infos
+
+    def _empty_infos(self) -> list[dict[str, Any]]:
+        """A new list of empty dicts, the same ones each time unless somebody wrote into one."""
+        if any(self._empty):
+            self._empty = [{} for _ in range(self.num_envs)]
+        return self._empty.copy()
 
     def _own(self, observations: NDArray[Any]) -> NDArray[Any]:
         """A copy where the environment hands out the array that it goes on writing into."""

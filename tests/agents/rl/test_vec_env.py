@@ -120,6 +120,15 @@ class Silent:
         return np.zeros(len(obs), np.int64), state
 
 
+def test_what_is_written_into_an_info_stays_there() -> None:
+    env = adapted(IDS[0], 3)
+    env.reset()
+    for t in range(5):
+        infos = env.step(np.zeros(3, np.int64))[3]
+        assert infos == [{}, {}, {}]
+        infos[t % 3]["note"] = t
+
+
 def test_monitors_know_the_environment() -> None:
     spec = adapted(IDS[1], 2).spec
     assert spec is not None and spec.id == IDS[1]
