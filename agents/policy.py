@@ -14,7 +14,7 @@ from agents.lane_group import Answers
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 
-TRIALS_AT_ONCE = 200
+TRIALS_AT_ONCE = 500
 """Trials that one `predict` answers side by side."""
 
 
