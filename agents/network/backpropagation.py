@@ -25,6 +25,7 @@ class Rule(NamedTuple):
     """1 where E in noise is −1 at output spikes only, else 0."""
     lift_above: float
     """1 where E > 0 reaches bins above threshold too, else 0."""
+    max_step: float
 
 
 def rule_row(settings: BackPropagation) -> tuple[float, ...]:
@@ -35,6 +36,7 @@ def rule_row(settings: BackPropagation) -> tuple[float, ...]:
         settings.momentum,
         float(settings.noise_error == "spikes"),
         float(settings.lift_above),
+        settings.max_step,
     )
 
 
@@ -42,7 +44,7 @@ def rule_row(settings: BackPropagation) -> tuple[float, ...]:
 def rule_at(rows: Table, n: int) -> Rule:
     """Row `n` as a Rule."""
     row = rows[n]
-    return Rule(row[0], row[1], row[2], row[3], row[4])
+    return Rule(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
 @compiled
@@ -143,6 +145,24 @@ def backpropagate(
 
 
 @compiled
+def shorten(change: Row, max_step: float) -> None:
+    """Scale `change` down to the length `max_step` if it is longer."""
+    largest = 0.0
+    for i in range(len(change)):
+        largest = max(largest, abs(change[i]))
+    if largest == 0.0 or max_step == np.inf:
+        return
+    # Squares of numbers up to 1 do not overflow. What is infinite or NaN already becomes NaN.
+    total = 0.0
+    for i in range(len(change)):
+        total += (change[i] / largest) ** 2
+    length = largest * np.sqrt(total)
+    if not length <= max_step:
+        for i in range(len(change)):
+            change[i] *= max_step / length
+
+
+@compiled
 def learn_trial(
     wiring: Wiring,
     rule: Rule,
@@ -166,6 +186,7 @@ def learn_trial(
         gradient[i] *= rule.rate_hidden
     for i in range(n_hidden, len(gradient)):
         gradient[i] *= rule.rate_output
+    shorten(gradient, rule.max_step)
     p = RuleParameters(rule.rate_output, rule.momentum, -np.inf, np.inf, 0.0, 0.0, 1.0)
     sound: bool = apply_change(
         p, True, gradient.reshape(-1, 1), weights.reshape(-1, 1), previous.reshape(-1, 1)

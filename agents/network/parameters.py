@@ -100,6 +100,8 @@ class BackPropagation:
             in error-trace learning, or only in those with V < ϑ_R: an upward crossing cannot begin
             in the others, and raising them too keeps a network that is above threshold for long
             there for ever.
+        max_step: longest step that one trial may cause, momentum aside: the Euclidean length of the
+            change of all weights together; infinity sets no limit.
     """
 
     learning_rate_hidden: float = 3e-3
@@ -107,6 +109,7 @@ class BackPropagation:
     momentum: float = 0.2
     noise_error: str = "above"
     lift_above: bool = False
+    max_step: float = 0.3
 
     name: ClassVar[str] = "bp"
 
@@ -117,3 +120,4 @@ class BackPropagation:
         choice("noise_error", self.noise_error, NOISE_ERRORS)
         if not isinstance(self.lift_above, (bool, np.bool_)):
             raise ValueError(f"lift_above must be True or False, got {self.lift_above!r}")
+        real("max_step", self.max_step, above=0.0, finite=False)

@@ -77,7 +77,7 @@ def slope(network: Network, raster: NDArray[Any], weights: Floats, E: Floats) ->
 
 def gradient_learner(network: Network, n_inputs: int, seed: int = 0, **rule: Any) -> NetworkAgent:
     """An agent whose weight change in its first learning step is ∂J/∂w itself."""
-    settings = BackPropagation(1.0, 1.0, **rule)
+    settings = BackPropagation(1.0, 1.0, **{"max_step": np.inf, **rule})
     agent = NetworkAgent(network, settings, n_inputs, seed)
     rng = np.random.default_rng(seed)
     agent.weights = rng.normal(0.25, 0.6, len(agent.weights))

@@ -78,7 +78,7 @@ def test_the_gradient_runs_through_the_inhibition() -> None:
 @pytest.mark.parametrize("momentum", [0.0, 0.2, 0.9])
 def test_without_a_hidden_layer_it_is_error_trace_learning_to_the_last_bit(momentum: float) -> None:
     rule = BackPropagation(
-        learning_rate_output=2e-3, momentum=momentum, noise_error="above", lift_above=True
+        learning_rate_output=2e-3, momentum=momentum, lift_above=True, max_step=np.inf
     )
     network = NetworkAgent(Network(hidden=None, alpha=0.25), rule, BUSY.n_inputs, 3)
     neuron = NeuronAgent(
@@ -95,7 +95,8 @@ def test_without_a_hidden_layer_it_is_error_trace_learning_to_the_last_bit(momen
 def test_each_layer_has_its_own_learning_rate() -> None:
     trial = draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1))
     plain = gradient_learner(Network(hidden=3), BUSY.n_inputs)
-    agent = NetworkAgent(Network(hidden=3), BackPropagation(0.5, 0.25), BUSY.n_inputs)
+    rule = BackPropagation(0.5, 0.25, max_step=np.inf)
+    agent = NetworkAgent(Network(hidden=3), rule, BUSY.n_inputs)
     agent.weights = plain.weights
     play(plain, trial)
     play(agent, trial)
@@ -113,6 +114,31 @@ def test_a_step_adds_a_fraction_of_the_step_before_it() -> None:
     play(agent, trial)
     play(fresh, trial)
     np.testing.assert_allclose(agent.momentum, fresh.momentum + 0.4 * before, rtol=1e-12)
+
+
+@pytest.mark.parametrize("fraction", [0.999, 1.001, 1e-3])
+def test_a_step_longer_than_allowed_keeps_its_direction_and_gets_the_allowed_length(
+    fraction: float,
+) -> None:
+    trial = draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1))
+    free = gradient_learner(Network(hidden=3), BUSY.n_inputs)
+    play(free, trial)
+    length = np.linalg.norm(free.momentum)
+    held = gradient_learner(Network(hidden=3), BUSY.n_inputs, max_step=fraction * length)
+    play(held, trial)
+    assert np.linalg.norm(held.momentum) == pytest.approx(min(fraction, 1.0) * length)
+    np.testing.assert_allclose(held.momentum, min(fraction, 1.0) * free.momentum, rtol=1e-12)
+
+
+def test_a_step_is_shortened_before_momentum_is_added_and_however_long_it_is() -> None:
+    agent = NetworkAgent(
+        Network(hidden=3), BackPropagation(1e200, 1e200, max_step=0.1), BUSY.n_inputs
+    )
+    agent.momentum[:] = before = np.random.default_rng(0).normal(size=len(agent.weights))
+    agent.weights = 2.0
+    play(agent, draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1)))
+    assert np.linalg.norm(agent.momentum - 0.2 * before) == pytest.approx(0.1)
+    assert not agent.overflowed
 
 
 def test_a_trial_without_error_changes_nothing_momentum_included() -> None:
@@ -144,7 +170,8 @@ def test_a_pattern_that_ends_the_trial_is_counted() -> None:
 
 @pytest.mark.parametrize("loop", ["train", "train_many"])
 def test_a_weight_that_would_overflow_ends_learning_and_nothing_is_lost(loop: str) -> None:
-    agent = NetworkAgent(Network(hidden=3), BackPropagation(1e200, 1e200), BUSY.n_inputs)
+    rule = BackPropagation(1e200, 1e200, max_step=np.inf)
+    agent = NetworkAgent(Network(hidden=3), rule, BUSY.n_inputs)
     with pytest.warns(WeightOverflow, match="would have overflowed"):
         if loop == "train":
             history = train(agent, trial_env(), 50, seed=1, block=10)

@@ -83,7 +83,9 @@ def test_gradients_agree_on_full_size_trials(classes: int) -> None:
     rng = np.random.default_rng(0)
     for seed in range(3):
         trial = draw_trial(task, patterns, rng)
-        agent = NetworkAgent(rule=BackPropagation(1.0, 1.0), seed=seed, initial_weight=0.6)
+        agent = NetworkAgent(
+            rule=BackPropagation(1.0, 1.0, max_step=np.inf), seed=seed, initial_weight=0.6
+        )
         module = NetworkModule.from_agent(agent)
         found = gradient(module, [trial], agent.rule)
         play(agent, trial)

@@ -40,6 +40,8 @@ def test_a_network_names_field_value_and_range(field: str, value: Any, message: 
         ("learning_rate_output", float("inf"), "learning_rate_output must be finite, got inf"),
         ("momentum", 1.2, "momentum must be in 0 … 1, got 1.2"),
         ("noise_error", "never", "noise_error must be one of 'above', 'spikes', got 'never'"),
+        ("max_step", 0.0, "max_step must be > 0, got 0.0"),
+        ("max_step", float("nan"), "max_step must be finite, got nan"),
         ("lift_above", 1, "lift_above must be True or False, got 1"),
     ],
 )
