@@ -37,6 +37,8 @@ from gnm_env.vector_kernels import (
 )
 
 NO_LIMIT = 2**30
+NAMES = np.array([None, *MISTAKES[1:]], object)
+"""Mistakes by number, as `info` names them."""
 AUTORESET = {
     AutoresetMode.NEXT_STEP: NEXT_STEP,
     AutoresetMode.SAME_STEP: SAME_STEP,
@@ -70,7 +72,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     ## Info
     As Gymnasium's SyncVectorEnv has it: for each key an array over environments, and under `_key` a
-    bool array that tells where it holds. Lists stand in object arrays.
+    bool array that tells where it holds (one for all keys, read-only). Lists are in object arrays.
     """
 
     def __init__(
@@ -410,19 +412,20 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             classes[i] = numbers[second:third]
             targets[i] = numbers[third:at]
             pattern_bins[i] = self.task.pattern_bins
+        mask = _read_only(terminated)
         return {
             "label": labels,
-            "_label": terminated.copy(),
+            "_label": mask,
             "emitted": outputs,
-            "_emitted": terminated.copy(),
+            "_emitted": mask,
             "onsets": onsets,
-            "_onsets": terminated.copy(),
+            "_onsets": mask,
             "classes": classes,
-            "_classes": terminated.copy(),
+            "_classes": mask,
             "targets": targets,
-            "_targets": terminated.copy(),
+            "_targets": mask,
             "pattern_bins": pattern_bins,
-            "_pattern_bins": terminated.copy(),
+            "_pattern_bins": mask,
         }
 
 
@@ -461,8 +464,7 @@ class PatternStreamVectorEnv(PatternVectorEnv):
         )
         self._state = np.zeros(self.num_envs, STREAM_STATE)
         self._state["anew"] = 1
-        self._mistakes = np.zeros(self.num_envs, np.int64)
-        self._classes = np.zeros(self.num_envs, np.int64)
+        self._clean_results()
 
     def _most_bins(self) -> float:
         return PIECE_BINS + self.task.pattern_bins
@@ -496,16 +498,21 @@ class PatternStreamVectorEnv(PatternVectorEnv):
         return self._seen(), rewards, terminated, truncated, info
 
     def _terminal_info(self, terminated: NDArray[np.bool_]) -> dict[str, Any]:
-        which = np.flatnonzero(terminated)
-        if len(which) == 0:  # truncated only
+        if not terminated.any():  # truncated only
             return {}
-        classes, self._classes = self._classes, np.zeros(self.num_envs, np.int64)
-        names = np.empty(self.num_envs, object)
-        for i, mistake in zip(which.tolist(), self._mistakes[which].tolist(), strict=True):
-            names[i] = MISTAKES[mistake]
-        return {
-            "mistake": names,
-            "_mistake": terminated.copy(),
-            "class": classes,
-            "_class": terminated.copy(),
-        }
+        names, classes = NAMES[self._mistakes], self._classes
+        self._clean_results()
+        mask = _read_only(terminated)
+        return {"mistake": names, "_mistake": mask, "class": classes, "_class": mask}
+
+    def _clean_results(self) -> None:
+        """New arrays for the mistakes; the old ones now belong to the caller of `step`."""
+        self._mistakes = np.zeros(self.num_envs, np.int64)
+        self._classes = np.zeros(self.num_envs, np.int64)
+
+
+def _read_only(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A copy that may stand in `info` under several keys."""
+    copy = mask.copy()
+    copy.setflags(write=False)
+    return copy

@@ -113,10 +113,10 @@ def new_crowd(
     n = observations.shape[0]
     return Crowd(
         held, world, autoreset, limit, most, feedback, tolerance,
-        np.zeros((4, n), np.int32), state, emitted,
+        np.zeros((4, n), np.uint32), state, emitted,
         events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
-        observations, np.empty(observations.size, np.int64), 0,
-        over, 0, finals, np.empty(n + 1, np.int64),
+        observations, np.empty(observations.size, np.uint64), 0,
+        over, 0, finals, np.empty(n + 1, np.uint32),
     )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ def _store(
     # Every bin is written to where its spikes begin; an empty one is overwritten by the next, and
     # further spikes of a bin take the bin of those before. No branch depends on the spikes.
     for t in range(n_bins):
-        row[offsets[t]] = t
+        row[np.uint64(offsets[t])] = t
     bin_ = 0
     for e in range(n_events):
         bin_ = max(bin_, row[e])
@@ -174,7 +174,7 @@ def _look(
     events: NDArray[Any],
     shift: int,
     observations: NDArray[np.int8],
-    shown: NDArray[np.int64],
+    shown: NDArray[np.uint64],
     n_shown: int,
 ) -> tuple[int, bool]:
     """Show the spikes of the bin in row `i`, which is clear, and note when to look again.
@@ -182,18 +182,19 @@ def _look(
     Returns the number of ones now shown, and whether what was drawn has come to its end.
     """
     end = (1 << shift) - 1
+    bin_ = np.int64(bins[i]) << shift
     cursor = cursors[i]
-    event = events[i, cursor]
-    while event >> shift == bins[i] and event & end != end:
-        channel = event & end
-        observations[i, channel] = 1
-        shown[n_shown] = i * observations.shape[1] + channel
+    # Within the bin this is the channel; at the end of what was drawn `end`, in later bins more.
+    channel = events[i, cursor] - bin_
+    while channel < end:
+        observations[i, np.uint32(channel)] = 1
+        shown[np.uint32(n_shown)] = i * observations.shape[1] + channel
         n_shown += 1
-        cursor += 1
-        event = events[i, cursor]
+        cursor = np.uint32(cursor + 1)
+        channel = events[i, cursor] - bin_
     cursors[i] = cursor
-    due[i] = min(event >> shift, deadlines[i])
-    return n_shown, event >> shift == bins[i]
+    due[i] = min((channel + bin_) >> shift, deadlines[i])
+    return n_shown, channel == end
 
 
 @compiled
@@ -211,8 +212,9 @@ def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> None:
     n_inputs = crowd.observations.shape[1]
     n_shown = 0
     for place in crowd.shown[: crowd.n_shown]:
-        if which[place // n_inputs]:
-            crowd.observations[place // n_inputs, place % n_inputs] = 0
+        i = np.int64(place) // n_inputs
+        if which[i]:
+            crowd.observations[i, np.int64(place) - i * n_inputs] = 0
         else:
             crowd.shown[n_shown] = place
             n_shown += 1
@@ -275,7 +277,7 @@ def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
         emitted[i] = 0
         bins[i], cursors[i], deadlines[i] = 0, 0, crowd.limit
         n_shown, _ = _look(
-            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
         )
     crowd.events, crowd.parts, crowd.n_shown = events, parts, n_shown
 
@@ -328,7 +330,7 @@ def step_trials(
     n_over = length = 0
     for i in looks[:n_looks]:
         n_shown, ended = _look(
-            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
         )
         if not ended and bins[i] < deadlines[i]:
             continue
@@ -437,7 +439,7 @@ def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
         if begin:
             deadlines[i] = bins[i] + crowd.limit
         n_shown, _ = _look(
-            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
         )
     crowd.events, crowd.n_shown = events, n_shown
 
@@ -488,7 +490,7 @@ def step_streams(
     n_over = n_used_up = 0
     for i in looks[:n_looks]:
         n_shown, used_up = _look(
-            i, bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
+            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
         )
         if used_up or actions[i] != 0:
             mistake, class_ = _mistake(crowd.state[i], bins[i], actions[i], crowd.world.targets)
