@@ -255,8 +255,9 @@ def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
     """Draw a trial for each environment in `which` and show its first bin; their rows are clear."""
     if which.size == 0:
         return
-    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
-    onsets, classes = np.empty(16, np.int64), np.empty(16, np.int64)
+    channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
+    offsets[0] = 0
+    onsets, classes = np.empty(64, np.int64), np.empty(64, np.int64)
     held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
     events, parts, observations, shown = crowd.events, crowd.parts, crowd.observations, crowd.shown
     bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
@@ -414,7 +415,8 @@ def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
     """
     if which.size == 0:
         return
-    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
+    offsets[0] = 0
     held, world, state, events = crowd.held, crowd.world, crowd.state, crowd.events
     observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
     shift = crowd.shift
