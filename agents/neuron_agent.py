@@ -274,6 +274,7 @@ class NeuronAgent:
             "rule": self.rule.name,
             "rule_parameters": asdict(self.rule),  # type: ignore[call-overload]
             "weight_bounds": self.weight_bounds,
+            "overflowed": self.overflowed,
         }
         arrays = {"weights": self._weights, "momentum": self.momentum}
         checkpoint.write(path, "neuron", header, arrays, task=task, patterns=patterns, rng=rng)
@@ -306,6 +307,7 @@ class NeuronAgent:
             raise ValueError(f"momentum must have shape ({agent.n_inputs},)")
         _require_finite(arrays["momentum"], "momentum")
         agent.momentum[:] = arrays["momentum"]
+        agent.overflowed = bool(header["overflowed"])
         return agent
 
     def replaced(self, **changes: Any) -> NeuronAgent:

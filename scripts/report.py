@@ -166,16 +166,26 @@ def page(
             for name, paths in pictures.items()
         ],
         undrawn=[name for name in PICTURES if name not in pictures],
-        stores=[
-            {"name": name, "blocks": cost.blocks, "wall": duration(cost.wall),
-             "work": duration(cost.seconds), "seconds": cost.wall,
-             "commits": ", ".join(c[:10] + ("+" if c.endswith("+") else "") for c in cost.commits)}
-            for name, cost in costs.items()
-        ],
+        stores=stores(costs),
         total=duration(sum(cost.wall for cost in costs.values())),
         software=software(),
         commit=commit()[:10],
     )  # fmt: skip
+
+
+def stores(costs: Mapping[str, Summary]) -> list[dict[str, Any]]:
+    """What each store cost, and which versions made it."""
+    return [
+        {
+            "name": name,
+            "blocks": cost.blocks,
+            "wall": duration(cost.wall),
+            "work": duration(cost.seconds),
+            "seconds": round(cost.wall, 1),
+            "commits": ", ".join(c[:10] + ("+" if c.endswith("+") else "") for c in cost.commits),
+        }
+        for name, cost in costs.items()
+    ]
 
 
 def _inline(svg: Path) -> str:
@@ -198,6 +208,7 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
         "commit": commit(),
         "claims": [asdict(row) for row in claims],
         "table": {name: [asdict(cell) for cell in cells] for name, cells in table.items()},
+        "stores": stores(costs),
     }
     text = json.dumps(record, indent=1, ensure_ascii=False)
     (out / "claims.json").write_text(text + "\n", encoding="utf-8")

@@ -92,6 +92,7 @@ class ContinuousAgent(NeuronAgent):
             "rule": self.rule.name,
             "rule_parameters": asdict(self.rule),  # type: ignore[call-overload]
             "weight_bounds": self.weight_bounds,
+            "overflowed": self.overflowed,
         }
         arrays = {"weights": self.weights, "momentum": self.momentum}
         checkpoint.write(path, "continuous", header, arrays, task=task, patterns=patterns, rng=rng)
@@ -101,12 +102,14 @@ class ContinuousAgent(NeuronAgent):
         cls, header: dict[str, Any], arrays: dict[str, NDArray[Any]]
     ) -> ContinuousAgent:
         bounds = header["weight_bounds"]
-        return cls(
+        agent = cls(
             ContinuousGNM(**header["neuron_parameters"]),
             RULES[header["rule"]](**header["rule_parameters"]),
             n_inputs=len(arrays["weights"]),
             weight_bounds=None if bounds is None else tuple(bounds),
         )._with(arrays["weights"], arrays["momentum"])
+        agent.overflowed = bool(header["overflowed"])
+        return agent
 
     def replaced(self, **changes: Any) -> ContinuousAgent:
         neuron = replace(self.neuron, **changes)

@@ -17,17 +17,13 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.continuous.flow import STEPS_PER_BIN, Between, amount, flow
-from agents.kernels import (
-    MOST_SPIKES,
-    Block,
-    Heard,
-    Log,
+from agents.kernels import MOST_SPIKES, Block, Heard, Log, kernels
+from agents.kernels.streams import train_template
+from agents.kernels.trial import (
     drive_at,
-    kernels,
     learn_trial_template,
     run_trial_template,
     sum_eligibility_template,
-    train_template,
 )
 from agents.lanes import pack, store, unpack
 from agents.learning.rule import Rule
@@ -189,7 +185,7 @@ def survive_template(
 def answer_template(
     rng: Generator, world: World, trials: int, mode: Any, parameters: Block, weights: Block
 ) -> tuple[NDArray[np.int64], Block, Block, int]:
-    """Rounded responses of each neuron to `trials` trials; as `agents.kernels.answer_template`."""
+    """Rounded responses of each neuron to `trials` trials; as in `agents.kernels.streams`."""
     n_neurons = len(weights)
     table = np.zeros((n_neurons, 1, world.n_classes, MOST_SPIKES + 1), np.int64)
     false_alarms = np.zeros((n_neurons, 1, 1))
@@ -247,7 +243,7 @@ def hear_template(
     above: Block,
     spikes: NDArray[np.int64],
 ) -> float:
-    """One bin of the standard loop, as `agents.kernels.hear_template`; returns the amount S."""
+    """One bin of the standard loop, as in `agents.kernels.stepwise`; returns the amount S."""
     n_events = offsets[t]
     if t == len(V) or n_events + len(observation) > len(channels):
         return -1.0

@@ -274,6 +274,7 @@ class NetworkAgent:
             "network": asdict(self.network),
             "rule_parameters": asdict(self.rule),
             "n_inputs": self.n_inputs,
+            "overflowed": self.overflowed,
         }
         arrays = {"weights": self._weights, "momentum": self.momentum}
         checkpoint.write(path, "network", header, arrays, task=task, patterns=patterns, rng=rng)
@@ -300,6 +301,7 @@ class NetworkAgent:
             header["n_inputs"],
         )
         agent._take(arrays["weights"], arrays["momentum"])
+        agent.overflowed = bool(header["overflowed"])
         return agent
 
     def replaced(self, **changes: Any) -> NetworkAgent:

@@ -146,7 +146,10 @@ def residual_plot(results: Results) -> Figure:
         axes.set_xlabel("η (model choice)")
     for axes in grid[:, 0]:
         axes.set_ylabel("residual (bins)")
-    grid[0, 0].legend(loc="lower left", ncols=2, title="pattern seed", title_fontsize=7)
+    figure.legend(
+        *grid[0, 0].get_legend_handles_labels(),
+        loc="outside lower center", ncols=5, title="pattern seed", title_fontsize=7,
+    )  # fmt: skip
     return figure
 
 

@@ -25,7 +25,9 @@ from agents import (
     load_checkpoint,
     noisy_performance,
 )
+from agents.continuous import ContinuousAgent, ContinuousGNM
 from agents.learning.rule import Rule
+from agents.network import BackPropagation, Network, NetworkAgent
 from agents.neurons.neuron import Neuron
 from gnm_env import Patterns, Task
 from tests.agents.worlds import BUSY, BUSY_PATTERNS
@@ -81,6 +83,22 @@ def test_every_neuron_and_rule_comes_back_as_it_was(
     assert again.patterns == BUSY_PATTERNS
     assert again.rng is not None
     assert again.rng.random(9).tolist() == rng.random(9).tolist()
+
+
+@pytest.mark.parametrize("overflowed", [False, True])
+@pytest.mark.parametrize(
+    "agent",
+    [
+        small_agent(),
+        NetworkAgent(Network(hidden=2), BackPropagation(), 4),
+        ContinuousAgent(ContinuousGNM(), AggregateLabel(fraction=0.25), 4),
+    ],
+    ids=lambda agent: type(agent).__name__,
+)
+def test_learning_that_has_ended_stays_ended(agent: Any, overflowed: bool, tmp_path: Path) -> None:
+    agent.overflowed = overflowed
+    agent.save(tmp_path / "agent")
+    assert load_checkpoint(tmp_path / "agent").agent.overflowed is overflowed
 
 
 def test_what_was_not_saved_is_not_there(tmp_path: Path) -> None:

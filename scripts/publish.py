@@ -1,0 +1,120 @@
+"""Keep a finished report in docs/reproduction: figures, claims and, packed, the stores.
+
+    python scripts/publish.py --size paper
+    python scripts/publish.py --size quick --stores
+
+Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, and with
+--stores one zip per experiment. Unpacked into results/SIZE/NAME, it is the store that it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import commandline
+from experiments.registry import SIZES
+from figures import RESULTS
+from report import REPORT
+from store import read
+
+DOCS = Path("docs") / "reproduction"
+KEPT = ("png", "pdf")
+
+
+def main(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Replace what is kept of one size."""
+    found = claims(arguments.report, arguments.size)
+    results = arguments.results or RESULTS / arguments.size
+    target = arguments.out / arguments.size
+    shutil.rmtree(target, ignore_errors=True)
+    (target / "figures").mkdir(parents=True)
+    for suffix in KEPT:
+        for picture in sorted((arguments.report / "figures").glob(f"*.{suffix}")):
+            shutil.copy(picture, target / "figures")
+    shutil.copy(arguments.report / "claims.json", target)
+    (target / "claims.md").write_text(page(found), encoding="utf-8")
+    packed = []
+    if arguments.stores:
+        for store in found["stores"]:
+            packed.append(pack(results / store["name"], target / "stores"))
+    print(f"{len(found['claims'])} claims and {len(packed)} stores in {target}")
+    return {"folder": str(target), "stores": [str(path) for path in packed]}
+
+
+def claims(report: Path, size: str) -> dict[str, Any]:
+    """What claims.json of a report says; ValueError if there is none, or of another size."""
+    try:
+        found: dict[str, Any] = json.loads((report / "claims.json").read_text("utf-8"))
+    except FileNotFoundError:
+        raise ValueError(f"there is no report in {report}; run make reproduce first") from None
+    if found["size"] != size:
+        raise ValueError(
+            f"{report} is a report of size {found['size']!r}, not {size!r}; "
+            f"run python scripts/report.py --size {size} first"
+        )
+    return found
+
+
+def page(found: dict[str, Any]) -> str:
+    """The claims as Markdown: what was found, the verdicts, and what it took."""
+    lines = [
+        f"# The claims at {found['size']} size",
+        "",
+        "Written by `python scripts/publish.py`. The rules of the verdicts stand in claims.json",
+        "and beside the experiments; how it is all made: [reproduction.md](../../reproduction.md).",
+        "",
+        "| claim | in short | found | verdict |",
+        "|---|---|---|---|",
+        *(
+            _row(row["id"], row["words"], "<br>".join(row["numbers"]), f"**{row['verdict']}**")
+            for row in found["claims"]
+        ),
+        "",
+        "| experiment | blocks | time | work of all threads | version |",
+        "|---|---|---|---|---|",
+        *(
+            _row(store["name"], store["blocks"], store["wall"], store["work"], store["commits"])
+            for store in found["stores"]
+        ),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _row(*cells: Any) -> str:
+    return "| " + " | ".join(str(cell).replace("|", r"\|") for cell in cells) + " |"
+
+
+def pack(store: Path, folder: Path) -> Path:
+    """A store as one zip file; StoreError if it is not finished, or damaged."""
+    read(store)
+    folder.mkdir(exist_ok=True)
+    archive = folder / f"{store.name}.zip"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        for path in sorted(store.rglob("*")):
+            if path.is_file():
+                file.write(path, path.relative_to(store))
+    return archive
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--size", choices=SIZES, default="quick", help="default: %(default)s")
+    parser.add_argument("--stores", action="store_true", help="keep the stores too")
+    parser.add_argument("--results", type=Path, help=f"folder of stores; default: {RESULTS}/SIZE")
+    parser.add_argument("--report", type=Path, default=REPORT, help="default: %(default)s")
+    parser.add_argument("--out", type=Path, default=DOCS, help="default: %(default)s")
+    parser.add_argument("--json", action="store_true", help="end with one JSON object")
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    options = parse()
+    commandline.run(lambda: main(options), as_json=options.json, name="publish")
