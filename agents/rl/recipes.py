@@ -46,11 +46,10 @@ class Recipe:
     settings: Callable[[int], dict[str, Any]]
 
 
-ROLLOUT = 32_768
-"""Bins that PPO hears between two updates: 110 to 160 trials, each with one number to learn from.
-"""
+ROLLOUT = 16_384
+"""Bins that PPO hears between two updates: 55 to 80 trials, each with one number to learn from."""
 
-MINIBATCHES = 16
+MINIBATCHES = 8
 """Parts into which a rollout is cut for stochastic gradient steps."""
 
 
@@ -64,7 +63,7 @@ def _ppo(n_envs: int) -> dict[str, Any]:
     return {
         **_rollout(n_envs, ROLLOUT, MINIBATCHES),
         "n_epochs": 3,
-        "learning_rate": LinearSchedule(2e-3, 0.0, 1.0),
+        "learning_rate": LinearSchedule(3e-3, 0.0, 1.0),
         "gamma": 1.0,
         "gae_lambda": 1.0,
         "policy_kwargs": {"net_arch": {"pi": [64, 64], "vf": []}},
@@ -72,14 +71,20 @@ def _ppo(n_envs: int) -> dict[str, Any]:
 
 
 def _linear(n_envs: int) -> dict[str, Any]:
-    return {**_ppo(n_envs), "policy_kwargs": {"net_arch": []}}
+    return {
+        **_ppo(n_envs),
+        **_rollout(n_envs, ROLLOUT, MINIBATCHES // 2),
+        "learning_rate": LinearSchedule(1e-2, 0.0, 1.0),
+        "policy_kwargs": {"net_arch": []},
+    }
 
 
 def _recurrent(n_envs: int) -> dict[str, Any]:
     return {
         **_ppo(n_envs),
-        **_rollout(n_envs, ROLLOUT, 4),
+        **_rollout(n_envs, 2 * ROLLOUT, 4),
         "n_epochs": 4,
+        "learning_rate": LinearSchedule(2e-3, 0.0, 1.0),
         "policy_kwargs": {
             "net_arch": [],
             "lstm_hidden_size": 32,
@@ -107,8 +112,8 @@ def _dqn(n_envs: int) -> dict[str, Any]:
 
 
 RECIPES: dict[str, Recipe] = {
-    "ppo": Recipe(PPO, "MlpPolicy", TRACES, 128, _ppo),
-    "ppo-linear": Recipe(PPO, "MlpPolicy", TRACES, 128, _linear),
+    "ppo": Recipe(PPO, "MlpPolicy", TRACES, 64, _ppo),
+    "ppo-linear": Recipe(PPO, "MlpPolicy", TRACES, 64, _linear),
     "recurrent-ppo": Recipe(RecurrentPPO, "MlpLstmPolicy", RAW, 256, _recurrent),
     "dqn": Recipe(DQN, "MlpPolicy", TRACES, 16, _dqn),
 }
@@ -167,11 +172,11 @@ def make_rl_agent(
     The kinds:
 
     - "ppo": a perceptron of 64 × 64 units. γ = 1 and λ = 1: under feedback "cost" the only reward
-      comes some hundred bins after the spike that earned it, and at γ = 0.99 or λ = 0.95 nothing
-      of it arrives. 32,768 bins per update, since a trial teaches one number only. The critic is
+      comes some hundred bins after the spike that earned it, and of it γ = 0.99 would leave a part
+      and λ = 0.95 only what the critic guesses. 16,384 bins per update, since a trial teaches one number only. The critic is
       linear: with λ = 1 it is a mere baseline, no better for hidden layers, and half of the time.
     - "ppo-linear": the same without hidden layers: spikes where a weighted sum of traces is high,
-      the nearest relative of the neurons here.
+      the nearest relative of the neurons here. With so few weights larger steps are safe.
     - "recurrent-ppo": an LSTM on the raw bits, which has to find its own traces. More environments
       and larger batches, since SB3 walks through its sequences bin by bin.
     - "dqn": learns from dense feedback only. Under "cost" the return depends on the number of

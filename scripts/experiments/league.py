@@ -30,18 +30,18 @@ from gnm_env import Patterns, PatternStreamEnv, Task
 from gnm_env.sampling import append_piece, new_buffers
 from gnm_env.task import world
 
-MILESTONES = (100_000, 300_000, 600_000, 1_200_000, 3_000_000, 8_000_000, 12_000_000, 18_000_000)
+MILESTONES = (100_000, 200_000, 400_000, 800_000, 1_600_000, 4_000_000, 8_000_000, 12_000_000)
 """Bins heard at which a learner is scored; it is scored once more when its budget is spent."""
 
 FINAL = len(MILESTONES)
 """Place of the last score along the axis "milestone"."""
 
-MATCHED = {1: 1_200_000, 2: 8_000_000}
+MATCHED = {1: 1_600_000, 2: 8_000_000}
 """Bins at which all are compared, by number of classes: PPO's budget."""
 
 PARTS = ("neurons", "rl")
 RUN: dict[str, Any] = {"runs": 100, "cap": 10_000}
-SEEDS = {"quick": (3, 1), "full": (10, 10)}
+SEEDS = {"quick": (3, 1), "full": (10, 5)}
 """Number of pattern seeds of the neurons, and of the RL agents."""
 CLASSES = {"quick": (1,), "full": (1, 2)}
 FIRST_SEED = 100
@@ -66,13 +66,16 @@ NEURON_LEARNERS: dict[str, Setting] = {
     "oracle": {"reference": "oracle"},
 }
 
+_SLOW = {"most": 1_600_000}
+"""Bins that learners hear at most which take minutes per million."""
+
 RL_LEARNERS: dict[str, Setting] = {
     "PPO, cost": {"algorithm": "ppo", "feedback": "cost"},
     "PPO, dense": {"algorithm": "ppo", "feedback": "dense"},
     "PPO linear, cost": {"algorithm": "ppo-linear", "feedback": "cost"},
-    "RecurrentPPO, cost": {"algorithm": "recurrent-ppo", "feedback": "cost"},
-    "RecurrentPPO, dense": {"algorithm": "recurrent-ppo", "feedback": "dense"},
-    "DQN, dense": {"algorithm": "dqn", "feedback": "dense"},
+    "RecurrentPPO, cost": {"algorithm": "recurrent-ppo", "feedback": "cost", **_SLOW},
+    "RecurrentPPO, dense": {"algorithm": "recurrent-ppo", "feedback": "dense", **_SLOW},
+    "DQN, dense": {"algorithm": "dqn", "feedback": "dense", **_SLOW},
     "PPO, random weights": {
         "algorithm": "ppo",
         "feedback": "cost",
@@ -241,7 +244,8 @@ def _rl_agent(setting: Setting, log: Log) -> int:
 
     torch.set_num_threads(1)
     kind, task = setting["algorithm"], log.task
-    budget = setting.get("steps", setting.get("budget", MATCHED[setting["classes"]]))
+    matched = MATCHED[setting["classes"]]
+    budget = setting.get("steps", setting.get("budget", min(matched, setting.get("most", matched))))
     env = training_env(task, log.patterns, kind, feedback=setting["feedback"])
     model = make_rl_agent(
         kind,

@@ -41,9 +41,9 @@ def test_random_spikes_are_worse_than_silence():
 def test_a_neuron_is_scored_at_the_milestones_within_its_budget_and_at_its_end():
     values = cell(NEURON_LEARNERS["GNM, ALL"], trials=2_000)
     heard = values["heard"].tolist()
-    assert heard == [100_000, 300_000, *[-1] * (FINAL - 2), 400_000]
-    assert np.isfinite(values["seconds"][[0, 1, FINAL]]).all()
-    assert np.isnan(values["seconds"][2:FINAL]).all()
+    assert heard == [100_000, 200_000, 400_000, *[-1] * (FINAL - 3), 400_000]
+    assert np.isfinite(values["seconds"][[0, 1, 2, FINAL]]).all()
+    assert np.isnan(values["seconds"][3:FINAL]).all()
     assert values["parameters"] == 100
 
 
@@ -89,7 +89,7 @@ def made_up(learners: dict[str, float], seeds: int = 4) -> xr.Dataset:
             "pattern_seed": range(seeds),
             "milestone": [*MILESTONES, -1],
         },
-        {"budget": {1: MILESTONES[3]}},
+        {"budget": {1: MILESTONES[4]}},
     )
 
 
@@ -101,7 +101,7 @@ def test_the_table_puts_the_best_first_with_its_numbers():
     assert first["last"]["mean"] == pytest.approx(9_000, abs=20)
     low, high = first["last"]["ci95"]
     assert low <= first["last"]["mean"] <= high
-    assert first["equal_experience"] == 1_200_000 and first["seeds"] == 4
+    assert first["equal_experience"] == 1_600_000 and first["seeds"] == 4
     text = figures_league.text_table(table)
     assert text.index("PPO, cost") < text.index("silent")
     assert len({len(line) for line in text.splitlines() if line.startswith("|")}) == 1

@@ -17,7 +17,7 @@ pytest.importorskip("stable_baselines3")
 import train_rl
 
 SMALL = ["--n-envs", "4", "--runs", "3"]
-ROLLOUT = 32_768
+ROLLOUT = 16_384
 
 
 def run(*arguments: object) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def test_resuming_goes_on_from_where_it_was(trained, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], f"room for one rollout of 32,768 bins, got {ROLLOUT:,} of which {ROLLOUT:,} are done"),
+        ([], f"room for one rollout of 16,384 bins, got {ROLLOUT:,} of which {ROLLOUT:,} are done"),
         (["--n-classes", "2"], "n_classes is 1 there and 2 here"),
         (["--pattern-seed", "5"], "other patterns than those of --pattern-seed 5"),
         (["--feedback", "dense"], "feedback is 'cost' there"),
@@ -84,7 +84,7 @@ def test_only_the_same_task_can_be_resumed(trained, arguments, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--steps", "100"], "room for one rollout of 32,768 bins, got 100"),
+        (["--steps", "100"], "room for one rollout of 16,384 bins, got 100"),
         (["--steps", "0"], "--steps must be >= 1"),
         (["--n-envs", "0"], "--n-envs must be >= 1"),
         (["--n-classes", "0"], "n_classes must be >= 1"),

@@ -57,7 +57,7 @@ def test_equal_seeds_begin_equal_and_settings_override_the_recipe():
 def test_a_single_environment_is_seen_through_traces():
     model = make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0"))
     assert model.observation_space == TRACES.wrap(gym.make("gnm/PatternTrial-v0")).observation_space
-    assert model.n_steps == 32_768
+    assert model.n_steps == 16_384
 
 
 @pytest.mark.parametrize(
