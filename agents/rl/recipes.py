@@ -173,8 +173,9 @@ def make_rl_agent(
 
     - "ppo": a perceptron of 64 × 64 units. γ = 1 and λ = 1: under feedback "cost" the only reward
       comes some hundred bins after the spike that earned it, and of it γ = 0.99 would leave a part
-      and λ = 0.95 only what the critic guesses. 16,384 bins per update, since a trial teaches one number only. The critic is
-      linear: with λ = 1 it is a mere baseline, no better for hidden layers, and half of the time.
+      and λ = 0.95 only what the critic guesses. 16,384 bins per update, since a trial teaches one
+      number only. The critic is linear: with λ = 1 it is a mere baseline, no better for hidden
+      layers, which would take half of the time.
     - "ppo-linear": the same without hidden layers: spikes where a weighted sum of traces is high,
       the nearest relative of the neurons here. With so few weights larger steps are safe.
     - "recurrent-ppo": an LSTM on the raw bits, which has to find its own traces. More environments
