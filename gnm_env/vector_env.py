@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gnm_env.checks import choice, real, whole
 from gnm_env.generators import Generators
+from gnm_env.reused import ReusedRows
 from gnm_env.sampling import PIECE_BINS
 from gnm_env.scoring import MISTAKES
 from gnm_env.task import Patterns, Task, world
@@ -333,6 +334,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         )
         self._emitted = np.zeros(self.num_envs, np.float64 if self._graded else np.int64)
         self._report = np.zeros(64, np.int64)
+        self._lists = ReusedRows(3, self.num_envs)
         self._clean_results()
 
     def _clean_results(self) -> None:
@@ -399,18 +401,19 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             return {}
         labels, outputs = self._labels, self._outputs
         self._clean_results()
-        n = self.num_envs
-        onsets, classes, targets = np.empty((3, n), object)
-        pattern_bins = np.zeros(n, np.int64)
+        pattern_bins = np.zeros(self.num_envs, np.int64)
         numbers = self._report[:length].tolist()
-        at = 0
+        places, at = [], 0
         while at < length:
+            places.append(at)
+            at += 2 + 3 * numbers[at + 1]
+        onsets, classes, targets = self._lists.rows([numbers[at] for at in places])
+        for at in places:
             i, k = numbers[at], numbers[at + 1]
             first, second, third = at + 2, at + 2 + k, at + 2 + 2 * k
-            at = third + k
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
-            targets[i] = numbers[third:at]
+            targets[i] = numbers[third : third + k]
             pattern_bins[i] = self.task.pattern_bins
         mask = _read_only(terminated)
         return {
