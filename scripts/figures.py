@@ -49,10 +49,9 @@ PICTURES: dict[str, Picture] = {
     "F2": Picture(
         continuous.classes,
         ("F2",),
-        "A neuron in continuous time (pattern seed 0) under each of its two patterns alone. "
-        "Shaded is "
-        "the membrane potential above the threshold; its integral S is the output, and should be 1 "
-        "for the first class and 2 for the second.",
+        "A neuron in continuous time (the first pattern seed) under each of its two patterns "
+        "alone. Shaded is the membrane potential above the threshold; its integral S is the "
+        "output, and should be 1 for class 1 and 2 for class 2.",
     ),
     "F3": Picture(
         maps.one_class,
@@ -106,9 +105,10 @@ PICTURES: dict[str, Picture] = {
     "F8": Picture(
         continuous.volumes,
         ("F8",),
-        "A trained neuron (pattern seed 0) as a chemical reaction network: V of one stochastic run "
-        "with 25, 100 and 500 molecules per input spike, over the deterministic solution (black), "
-        "all with the same input. Shaded are the patterns, with the S that they are given.",
+        "A trained neuron (the first pattern seed) as a chemical reaction network: V of one "
+        "stochastic run with 25, 100 and 500 molecules per input spike, over the deterministic "
+        "solution (black), all with the same input. Shaded are the patterns, with the S that they "
+        "are given.",
     ),
     "F8-mistakes": Picture(
         continuous.mistakes,

@@ -13,6 +13,8 @@ import argparse
 import json
 import shutil
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,19 +33,35 @@ def main(arguments: argparse.Namespace) -> dict[str, Any]:
     found = claims(arguments.report, arguments.size)
     results = arguments.results or RESULTS / arguments.size
     target = arguments.out / arguments.size
-    shutil.rmtree(target, ignore_errors=True)
-    (target / "figures").mkdir(parents=True)
-    for suffix in KEPT:
-        for picture in sorted((arguments.report / "figures").glob(f"*.{suffix}")):
-            shutil.copy(picture, target / "figures")
-    shutil.copy(arguments.report / "claims.json", target)
-    (target / "claims.md").write_text(page(found), encoding="utf-8")
-    packed = []
-    if arguments.stores:
-        for store in found["stores"]:
-            packed.append(pack(results / store["name"], target / "stores"))
+    stores = [store["name"] for store in found["stores"]] if arguments.stores else []
+    with replaced(target) as fresh:
+        (fresh / "figures").mkdir()
+        for suffix in KEPT:
+            for picture in sorted((arguments.report / "figures").glob(f"*.{suffix}")):
+                shutil.copy(picture, fresh / "figures")
+        shutil.copy(arguments.report / "claims.json", fresh)
+        (fresh / "claims.md").write_text(page(found), encoding="utf-8")
+        packed = [pack(results / name, fresh / "stores").relative_to(fresh) for name in stores]
     print(f"{len(found['claims'])} claims and {len(packed)} stores in {target}")
-    return {"folder": str(target), "stores": [str(path) for path in packed]}
+    return {"folder": str(target), "stores": [str(target / path) for path in packed]}
+
+
+@contextmanager
+def replaced(folder: Path) -> Iterator[Path]:
+    """An empty folder beside `folder`, to be filled; without an error it takes `folder`'s place."""
+    fresh, old = (folder.with_name(folder.name + ending) for ending in (".partial", ".old"))
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir(parents=True)
+    try:
+        yield fresh
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise
+    if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+    fresh.rename(folder)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def claims(report: Path, size: str) -> dict[str, Any]:

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import argparse
 import errno
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import commandline
 from experiments.design import Block, Experiment
 from experiments.registry import NAMES, SIZES, experiment
+from experiments.training import LARGEST_SEED
 from progress import Progress, duration
 from store import Store, Summary, open_store, summarise
-from workers import Outcome, cluster, threads, timed
+from workers import Outcome, cluster, lost, threads, timed
 
 RESULTS = Path("results")
 
@@ -40,7 +42,8 @@ def sweep(
         repair: compute damaged blocks again, instead of refusing the store.
         interval: seconds between lines of progress where there is no terminal.
 
-    Raises StoreError, OSError (with the number of blocks that are kept), or what a block raises.
+    Raises StoreError, OSError (with the number of blocks that are kept; ConnectionError if workers
+    are gone), or what a block raises.
     """
     with open_store(folder, experiment, repair=repair) as store:
         pending, total = store.pending(), len(experiment.blocks())
@@ -53,25 +56,44 @@ def sweep(
 
 
 def _compute(store: Store, pending: list[Block], executor: Executor, progress: Progress) -> None:
-    futures: dict[Future[Outcome], Block] = {
-        executor.submit(timed, store.experiment.compute, block): block for block in pending
-    }
+    futures: dict[Future[Outcome], Block] = {}
     try:
+        with _told("while handing out blocks", "run it again", progress):
+            for block in pending:
+                futures[executor.submit(timed, store.experiment.compute, block)] = block
         while futures:
             finished, _ = wait(futures, timeout=1.0, return_when=FIRST_COMPLETED)
             for future in finished:
-                store.write(futures.pop(future), *future.result())
+                block = futures.pop(future)
+                with _told(f"while computing {block.where}", "run it again", progress):
+                    outcome = future.result()
+                with _told(f"while writing {store.folder}", "make room and run it again", progress):
+                    store.write(block, *outcome)
                 progress.advance()
             progress.tick()
-    except OSError as error:
-        raise OSError(
-            error.errno or errno.EIO,
-            f"{error.strerror or error} while writing {store.folder}; {progress.done} of "
-            f"{progress.total} blocks are kept: make room and run it again to go on",
-        ) from error
     finally:
         for future in futures:
             future.cancel()
+
+
+@contextmanager
+def _told(when: str, remedy: str, progress: Progress) -> Iterator[None]:
+    """Make one sentence, with what is kept, of lost workers and of what the system refuses."""
+    try:
+        yield
+    except Exception as error:
+        kept = f"{when}; {progress.done} of {progress.total} blocks are kept"
+        if lost(error):
+            raise ConnectionError(
+                f"a worker or the scheduler was lost ({type(error).__name__}) {kept}: "
+                f"see that they run and have memory enough, and {remedy} to go on"
+            ) from error
+        if isinstance(error, OSError):
+            raise OSError(
+                error.errno or errno.EIO,
+                f"{error.strerror or error} {kept}: {remedy} to go on",
+            ) from error
+        raise
 
 
 def workers(
@@ -87,19 +109,24 @@ def pattern_seeds(text: str) -> tuple[int, ...]:
     """ "10" means seeds 0 … 9, "3,5,8" these three, "10-19" these ten."""
     try:
         if "," in text:
-            seeds = tuple(int(part) for part in text.split(",") if part)
+            seeds: Sequence[int] = [int(part) for part in text.split(",") if part]
         elif "-" in text:
             first, last = text.split("-")
-            seeds = tuple(range(int(first), int(last) + 1))
+            seeds = range(int(first), int(last) + 1)
         else:
-            seeds = tuple(range(int(text)))
+            seeds = range(int(text))
     except ValueError:
         seeds = ()
     if not seeds:
         raise argparse.ArgumentTypeError(
             f"expected a number of seeds (10), a list (3,5,8) or a range (10-19), got {text!r}"
         )
-    return seeds
+    # By the ends: a tuple of all of them might not fit in memory.
+    if not 0 <= min(seeds[0], seeds[-1]) <= max(seeds[0], seeds[-1]) <= LARGEST_SEED:
+        raise argparse.ArgumentTypeError(
+            f"pattern seeds must be in 0 … {LARGEST_SEED}, got {text!r}"
+        )
+    return tuple(seeds)
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
@@ -125,6 +152,8 @@ def described(summary: Summary) -> dict[str, Any]:
 def main(arguments: argparse.Namespace) -> dict[str, Any]:
     """Run the sweep that the command line asks for."""
     wanted = experiment(arguments.name, arguments.size, arguments.seeds)
+    if arguments.seeds and all(axis.name != "pattern_seed" for axis in wanted.axes):
+        raise ValueError(f"{wanted.name} has no pattern seeds: leave --seeds out")
     folder = arguments.store or RESULTS / arguments.size / wanted.name
     with workers(arguments.scheduler, arguments.threads) as executor:
         summary = sweep(wanted, folder, executor, repair=arguments.repair)

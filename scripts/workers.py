@@ -11,7 +11,13 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+)
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,11 +44,23 @@ def timed(compute: Callable[[Block], Mapping[str, Any]], block: Block) -> Outcom
 @contextmanager
 def threads(count: int | None = None) -> Iterator[Executor]:
     """`count` threads, one per core by default. The compiled loops do not hold the GIL."""
-    executor = ThreadPoolExecutor(count or os.cpu_count() or 1, thread_name_prefix="block")
+    executor = ThreadPoolExecutor(count or _cores(), thread_name_prefix="block")
     try:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def lost(error: Exception) -> bool:
+    """Whether an error says that a worker or the scheduler is gone, not that a block failed."""
+    gone = (CancelledError, BrokenExecutor, ConnectionError, TimeoutError)
+    # Dask's own, by name: it may not be installed.
+    return isinstance(error, gone) or type(error).__module__.startswith("distributed.")
 
 
 @contextmanager
@@ -58,7 +76,7 @@ def cluster(address: str) -> Iterator[Executor]:
         import distributed
     except ImportError:
         raise ValueError(
-            "--scheduler needs Dask, which is not installed: pip install 'gnm-env[cluster]'"
+            '--scheduler needs Dask, which is not installed: pip install -e ".[cluster]"'
         ) from None
     _knock(address)
     with (

@@ -15,26 +15,21 @@ from experiments.verdict import Results
 from figures_continuous import draw_classes, draw_mistakes, draw_volumes
 from gnm_env import Patterns, Task
 
-SHOWN = 0
-"""The pattern seed whose neuron is shown: the first, whatever it does."""
-
 
 def classes(results: Results) -> Figure:
     """V and S of one neuron under each of its patterns."""
-    data = results["F2"].isel(classes=0).sel(pattern_seed=SHOWN)
-    task = Task(n_classes=int(data["classes"]))
-    neuron = untrained(data.attrs["settings"]["common"]["alpha"], SHOWN)
+    data, task, patterns = _shown(results["F2"])
+    alpha = data.attrs["settings"]["common"]["alpha"]
+    neuron = untrained(alpha, int(data["pattern_seed"]))
     neuron.weights = data["weights"].to_numpy()
-    patterns = Patterns.draw(task, SHOWN)
     courses = [course(neuron, pattern_spikes(patterns, c)) for c in range(task.n_classes)]
     return draw_classes(courses, task.owed, neuron.neuron.theta_r)
 
 
 def volumes(results: Results) -> Figure:
     """V of one network with few and with many molecules, over the same input."""
-    data = results["F8"].isel(classes=0).sel(pattern_seed=SHOWN)
-    task = Task(n_classes=int(data["classes"]))
-    trial = traced_trial(task, Patterns.draw(task, SHOWN), int(data["evaluation_seed"]))
+    data, task, patterns = _shown(results["F8"])
+    trial = traced_trial(task, patterns, int(data["evaluation_seed"]))
     stochastic = {int(m): _course(data["V"].sel(traced=m)) for m in data["traced"]}
     return draw_volumes(trial, _course(data["V_deterministic"]), stochastic)
 
@@ -46,6 +41,13 @@ def mistakes(results: Results) -> Figure:
     alone = (data[name].transpose("classes", "pattern_seed", "heard").to_numpy().ravel()
              for name in ("wrong_deterministic", "wrong_neuron"))  # fmt: skip
     return draw_mistakes(Mistakes(data["molecules"].to_numpy(), stochastic, *alone))
+
+
+def _shown(results: xr.Dataset) -> tuple[xr.Dataset, Task, Patterns]:
+    """The first pattern seed that is stored, whatever its neuron does, its task and patterns."""
+    data = results.isel(classes=0, pattern_seed=0)
+    task = Task(n_classes=int(data["classes"]))
+    return data, task, Patterns.draw(task, int(data["pattern_seed"]))
 
 
 def _course(V: xr.DataArray) -> Course:

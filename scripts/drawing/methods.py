@@ -105,6 +105,8 @@ def _differences(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]
     jitter = np.random.default_rng(0)
     for place, (first, second) in enumerate(shown):
         a, b = _common(values[first], values[second])
+        if not len(a):  # BP may have seeds of its own
+            continue
         difference, found = a - b, wins(a, b)
         x = place + jitter.uniform(-0.2, 0.2, len(difference))
         ahead = difference > 0

@@ -57,18 +57,9 @@ def _judge_edges(results: Results) -> Finding:
     held, words = {}, []
     for start in _MAPS:
         corner, spiky = _edges(_one_class(results, start))
-        held[start] = _below(corner, FAILURE) and _below(spiky, FAILURE)
+        held[start] = corner.below(FAILURE) and spiky.below(FAILURE)
         words.append(f"{start}: α, η ≤ 0.05 {corner:,.0f}; η ≥ 0.975 {spiky:,.0f} bins")
     return Finding(all(held.values()), _per_start(held), tuple(words))
-
-
-def _below(interval: Interval, bound: float) -> bool:
-    """Whether the interval, or without one the value, lies below the bound."""
-    return (interval.high if np.isfinite(interval.high) else interval.value) < bound
-
-
-def _above(interval: Interval, bound: float) -> bool:
-    return (interval.low if np.isfinite(interval.low) else interval.value) > bound
 
 
 # --- F3b: the steep rise -------------------------------------------------------------------------
@@ -87,7 +78,7 @@ def _judge_rise(results: Results) -> Finding:
         means = _average(column)
         reached = means["alpha"][(means >= 0.9 * top) & (means["alpha"] > 0.05)]
         end = float(reached.min()) if reached.size else np.inf
-        fails = _below(low, FAILURE)
+        fails = low.below(FAILURE)
         strict[start], late[start] = fails and end <= RISE_END, fails and end <= LATE_RISE_END
         words.append(
             f"{start}: {low:,.0f} bins at α = 0.05, {float(means.sel(alpha=0.075)):,.0f} at 0.075; "
@@ -112,7 +103,7 @@ def _judge_best(results: Results) -> Finding:
         fall = mean(column[:, 0] - column[:, 1])
         top = best(_average(scores))
         share = float(_average(scores).sel(eta=0.0, alpha=0.3)) / top.score
-        falls = _above(fall, 0.0)
+        falls = fall.above(0.0)
         strict[start] = falls and top.eta == 0.0 and 0.2 <= top.alpha <= 0.4
         plateau[start] = falls and share >= 0.95
         words.append(
@@ -151,7 +142,7 @@ def _judge_line(results: Results) -> Finding:
         "three classes": four.sel(classes=3),
     }
     found = {name: _line_gain(scores) for name, scores in maps.items()}
-    held = {name: _above(gain, 0.0) for name, (_, gain) in found.items()}
+    held = {name: gain.above(0.0) for name, (_, gain) in found.items()}
     words = [
         f"{name}: α* = {alpha:.3f}, gain along the line {gain:+,.0f} bins"
         for name, (alpha, gain) in found.items()

@@ -66,7 +66,7 @@ def _judge_one_class(results: Results) -> Finding:
         slope = bootstrap(_slope, lif, gnm)
         values = ratio(lif, gnm)
         comparable = bool(np.all((values >= COMPARABLE[0]) & (values <= COMPARABLE[1])))
-        held[_condition(start)] = comparable and slope.low > FLAT
+        held[_condition(start)] = comparable and slope.above(FLAT)
         words.append(
             _ratio_words(start, lif, gnm, slope)
             + f", all in {values.min():.2f} … {values.max():.2f}"
@@ -79,7 +79,7 @@ def _judge_three_classes(results: Results) -> Finding:
     for start in STARTS:
         lif, gnm = ratios(results["F6"], 3, start)
         slope = bootstrap(_slope, lif, gnm)
-        held[_condition(start)] = _ratio_at(0, lif, gnm).high < 1 and slope.high < -FLAT
+        held[_condition(start)] = _ratio_at(0, lif, gnm).below(1) and slope.below(-FLAT)
         words.append(_ratio_words(start, lif, gnm, slope))
     return Finding(all(held.values()), held, tuple(words))
 
@@ -122,15 +122,17 @@ def _et_conditions(held: dict[tuple[str, str], bool]) -> dict[str, bool]:
 
 
 def _judge_back_propagation(results: Results) -> Finding:
-    network = results["BP"]
+    shared = np.intersect1d(results["F7"]["pattern_seed"], results["BP"]["pattern_seed"])
+    if not shared.size:
+        return Finding(False, {}, ("no data: F7 and BP have no pattern seed in common",), False)
+    network, others = (results[name].sel(pattern_seed=shared) for name in ("BP", "F7"))
     bp = by_seed(score(network).sel(classes=2))
-    others = results["F7"].sel(pattern_seed=network["pattern_seed"])
     held, words = {}, [f"BP {mean(bp):,.0f} bins"]
     for learner, name in ET_FORMS.items():
         for start in STARTS:
             et = paired(others, start, learner)
             gain = mean(bp - et)
-            held[name, start] = not gain.low > 0
+            held[name, start] = not gain.above(0)
             words.append(f"{start} {name}: BP − ET {gain:+,.0f}, BP ahead in {wins(bp, et)}")
     return Finding(all(held.values()), _et_conditions(held), tuple(words))
 

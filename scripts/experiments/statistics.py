@@ -1,4 +1,8 @@
-"""Numbers with their uncertainty. The sample is always the pattern seeds, the first axis."""
+"""Numbers with their uncertainty.
+
+The sample is the first axis: the pattern seeds, except in F8, whose runs and trials are pooled over
+the seeds.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +32,14 @@ class Interval(NamedTuple):
             f"{self.low:{spec}} … {self.high:{spec}}" if math.isfinite(self.low) else "no interval"
         )
         return f"{self.value:{spec}} [{ends}]"
+
+    def below(self, bound: float) -> bool:
+        """Whether the interval, or without one the value, lies below the bound."""
+        return (self.high if math.isfinite(self.high) else self.value) < bound
+
+    def above(self, bound: float) -> bool:
+        """Whether the interval, or without one the value, lies above the bound."""
+        return (self.low if math.isfinite(self.low) else self.value) > bound
 
 
 class Wins(NamedTuple):

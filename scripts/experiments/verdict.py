@@ -26,15 +26,19 @@ class Finding:
         holds: whether the claim holds as it stands, under every protocol that it was tried under.
         conditions: what it holds under, where it does not hold as it stands.
         numbers: ours with their intervals, in words.
+        judged: False where the stores are there and yet leave nothing to compare.
     """
 
     holds: bool
     conditions: Mapping[str, bool]
     numbers: tuple[str, ...]
+    judged: bool = True
 
     @property
     def verdict(self) -> str:
-        """Reproduced, reproduced if …, or not reproduced."""
+        """Reproduced, reproduced if …, not reproduced, or missing."""
+        if not self.judged:
+            return MISSING
         if self.holds:
             return REPRODUCED
         kept = [condition for condition, holds in self.conditions.items() if holds]

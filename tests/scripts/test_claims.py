@@ -97,6 +97,29 @@ def test_a_network_that_is_better_than_error_traces_is_a_benefit() -> None:
     assert found("F7c", deep).verdict == NOT_REPRODUCED
 
 
+@pytest.mark.parametrize("id_", ["F6a", "F6b", "F7c"])
+def test_one_seed_has_no_interval_and_is_judged_by_its_value(id_: str) -> None:
+    def unlike(setting: Setting) -> float:
+        return 6_000.0 if setting["neuron"] == "network" else flat(setting)
+
+    assert found(id_, seeds=1).verdict == REPRODUCED
+    assert found(id_, unlike, seeds=1).verdict == NOT_REPRODUCED
+
+
+def test_a_network_is_compared_on_the_seeds_that_it_shares_with_error_traces() -> None:
+    some = world(as_in_the_paper, ["F7"], 5) | world(as_in_the_paper, ["BP"], 10)
+    finding = BY_ID["F7c"].finding(some)
+    assert finding is not None
+    assert finding.verdict == REPRODUCED
+    assert "of 5" in finding.numbers[1]
+
+    some["BP"] = some["BP"].isel(pattern_seed=slice(5, None))
+    finding = BY_ID["F7c"].finding(some)
+    assert finding is not None
+    assert finding.verdict == MISSING
+    assert finding.numbers == ("no data: F7 and BP have no pattern seed in common",)
+
+
 def test_the_mst_mark_may_come_back_at_the_lower_cap_alone() -> None:
     def skewed(setting: Setting) -> float:
         return 9_000.0 if setting["start"] == "matched" else 500.0

@@ -82,3 +82,15 @@ def test_what_is_not_there_or_damaged_is_refused(places: list[str], tmp_path: Pa
     chunk.write_bytes(b"nonsense")
     with pytest.raises(StoreError, match="damaged"):
         run(places, "--stores")
+
+
+def test_what_is_kept_stays_whole_if_a_store_is_missing(places: list[str], tmp_path: Path) -> None:
+    run(places, "--stores")
+    kept = {path: path.read_bytes() for path in tmp_path.glob("docs/**/*.*")}
+    (tmp_path / "results" / "toy").rename(tmp_path / "elsewhere")
+
+    with pytest.raises(StoreError, match="there is no store"):
+        run(places, "--stores")
+
+    assert {path: path.read_bytes() for path in tmp_path.glob("docs/**/*.*")} == kept
+    assert [path.name for path in (tmp_path / "docs").iterdir()] == ["quick"]

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import signal
@@ -7,7 +8,8 @@ import socket
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +87,42 @@ def test_a_block_that_fails_costs_no_finished_block(tmp_path: Path) -> None:
     run(tmp_path / "toy")
 
 
+class KilledWorker(Exception):
+    """As Dask raises it."""
+
+    __module__ = "distributed.scheduler"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (
+            CancelledError(),
+            r"a worker or the scheduler was lost \(CancelledError\) while computing",
+        ),
+        (KilledWorker("at\nlength"), r"a worker or the scheduler was lost \(KilledWorker\) while"),
+        (BrokenProcessPool(), r"a worker or the scheduler was lost \(BrokenProcessPool\) while"),
+        (TimeoutError(), r"a worker or the scheduler was lost \(TimeoutError\) while computing"),
+        (OSError(24, "Too many open files"), "Too many open files while computing classes 2, patt"),
+    ],
+)
+def test_what_goes_wrong_with_a_block_is_not_said_of_writing(
+    tmp_path: Path, error: Exception, told: str
+) -> None:
+    def fails(block: Block) -> dict[str, Any]:
+        if block.number == 9:
+            time.sleep(0.2)
+            raise error
+        return work(block)
+
+    with pytest.raises(
+        OSError, match=told + r".*; \d+ of 18 blocks are kept: .*run it again"
+    ) as info:
+        run(tmp_path / "toy", compute=fails)
+    assert "make room" not in str(info.value)
+    assert len(str(info.value).splitlines()) == 1
+
+
 def test_a_full_disk_is_one_line_with_what_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -112,12 +150,19 @@ def test_seeds_are_a_number_a_list_or_a_range(text: str, seeds: tuple[int, ...])
     assert pattern_seeds(text) == seeds
 
 
+@pytest.mark.parametrize("text", ["0-99999999999", "99999999999", "8999-9000", "3,9000"])
+def test_seeds_beyond_the_last_are_refused_before_they_are_listed(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match=r"must be in 0 … 8999, got"):
+        pattern_seeds(text)
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
         (["F99"], "there is no experiment 'F99': choose one of F1, F2"),
         (["F1", "--store", "/proc/nowhere/F1"], "cannot write in /proc/nowhere (No such file"),
         (["F1", "--threads", "0"], "--threads must be at least 1, got 0"),
+        (["F1", "--seeds", "3"], "F1 has no pattern seeds: leave --seeds out"),
     ],
 )
 def test_bad_input_ends_with_one_line_and_code_2(
