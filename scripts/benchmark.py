@@ -125,7 +125,7 @@ def illustrated(found: Findings, folder: Path) -> Path | None:
         draw(found, folder / "benchmark.png")
         return folder / "benchmark.png"
     except ImportError as error:
-        print(f'no picture: {error}; pip install "gnm-env[pictures]"', file=sys.stderr)
+        print(f'no picture: {error}; pip install -e ".[pictures]"', file=sys.stderr)
         return None
 
 

@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from report import REPORT
+
+with commandline.imports("report-check", "reproduce"):
+    from report import REPORT
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 WINDOWS = {"wide": (1280, 2400), "narrow": (400, 2400)}

@@ -143,7 +143,9 @@ def _print_traces(trial: Trial, traces: Traces) -> dict[str, Any]:
     rows = {"deterministic": (exact, np.zeros_like(exact))}
     rows |= {f"{m} molecules": (S.mean(axis=0), S.std(axis=0)) for m, S in traces.S.items()}
     for name, (mean, spread) in rows.items():
-        cells = ",  ".join(f"class {c}: {mean[c]:5.2f} ± {spread[c]:.2f}" for c in trial.classes)
+        cells = ",  ".join(
+            f"class {c + 1}: {mean[c]:5.2f} ± {spread[c]:.2f}" for c in trial.classes
+        )
         print(f"{name:>16}   S of {cells}")
     return {
         "deterministic_S": exact.tolist(),

@@ -12,14 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-from matplotlib.figure import Figure
-
 import commandline
-from drawing import constant_input, continuous, maps, methods, style
-from experiments.registry import NAMES, SIZES
-from experiments.verdict import Results
-from store import StoreError, read
+
+with commandline.imports("figures", "reproduce"):
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from drawing import constant_input, continuous, maps, methods, style
+    from experiments.registry import NAMES, SIZES
+    from experiments.verdict import Results
+    from store import StoreError, read
 
 RESULTS = Path("results")
 FORMATS = ("pdf", "png", "svg")
@@ -27,11 +29,12 @@ FORMATS = ("pdf", "png", "svg")
 
 @dataclass(frozen=True)
 class Picture:
-    """One figure: what it needs, what draws it, and its caption."""
+    """One figure: what it needs, what draws it, its caption, and what that adds on the data."""
 
     draw: Callable[[Results], Figure]
     needs: tuple[str, ...]
     caption: str
+    note: Callable[[Results], str] = lambda results: ""
 
 
 PICTURES: dict[str, Picture] = {
@@ -61,12 +64,14 @@ PICTURES: dict[str, Picture] = {
         "blue "
         "line on the colour bar what the MST reaches on the same task, the dashed curve the "
         "best line "
-        "(1−η)α = α*. (c) The same numbers against α; red is η = 0.",
+        "(1−η)α = α*, sought in α* = 0.05 … 0.5. (c) The same numbers against α; red is η = 0.",
+        lambda results: maps.edge_note(results["F3"]),
     ),
     "F3-published": Picture(
         maps.one_class_published,
         ("F3-published", "table"),
         "As the figure before, from the initial weights of the published code (GNM 0.3, MST 0.2).",
+        lambda results: maps.edge_note(results["F3-published"]),
     ),
     "F4": Picture(
         maps.more_classes,
@@ -74,6 +79,7 @@ PICTURES: dict[str, Picture] = {
         "Two, three and four classes, read out from the membrane potential V (upper row) and from "
         "the decay D with unbounded weights (lower row). Marks as before; every colour bar has its "
         "own scale.",
+        lambda results: maps.edge_note(results["F4"].sel(readout="V")),
     ),
     "F5a": Picture(
         maps.against_alpha,
@@ -119,6 +125,11 @@ PICTURES: dict[str, Picture] = {
         "95 % bootstrap intervals over trials.",
     ),
 }
+
+
+def caption(name: str, results: Results) -> str:
+    """The caption of a figure that was drawn from `results`."""
+    return PICTURES[name].caption + PICTURES[name].note(results)
 
 
 def load(results: Path, names: Sequence[str] = NAMES) -> tuple[dict[str, xr.Dataset], list[str]]:

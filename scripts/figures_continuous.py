@@ -65,7 +65,7 @@ def draw_classes(courses: Sequence[Trajectory], targets: Sequence[int], theta_r:
             _threshold(axis, theta_r)
             axis.set(xlim=(0.0, float(course.t[-1])), ylim=(0.0, top))
             axis.set_title(
-                f"pattern of class {c}: $S$ = {course.S[-1]:.2f}, owed {targets[c]}", loc="left"
+                f"pattern of class {c + 1}: $S$ = {course.S[-1]:.2f}, owed {targets[c]}", loc="left"
             )
         # Above the first panel's frame, where no trace can be.
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderpad=0.1)
@@ -143,6 +143,6 @@ def _occurrences(axis: Axes, trial: Trial, S: NDArray[np.float64]) -> None:
     for onset, class_, amount in places:
         stop = onset + trial.pattern_bins
         axis.axvspan(onset, stop, color=class_colour(class_), alpha=0.15, linewidth=0)
-        text = f"class {class_}: $S$ = {amount:.2f}"
+        text = f"class {class_ + 1}: $S$ = {amount:.2f}"
         top = axis.get_ylim()[1]
         axis.text((onset + stop) / 2, 0.97 * top, text, ha="center", va="top", fontsize=7)

@@ -19,10 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from experiments.registry import SIZES
-from figures import RESULTS
-from report import REPORT
-from store import read
+
+with commandline.imports("publish", "reproduce"):
+    from experiments.registry import SIZES
+    from figures import RESULTS
+    from report import REPORT
+    from store import read
 
 DOCS = Path("docs") / "reproduction"
 KEPT = ("png", "pdf")

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from experiments.methods import REFERENCE
-from experiments.registry import experiment
-from report import reference
-from store import read
-from sweep import RESULTS, add_run_options, pattern_seeds, sweep, workers
+
+with commandline.imports("reference_table", "reproduce"):
+    from experiments.methods import REFERENCE
+    from experiments.registry import experiment
+    from report import reference
+    from store import read
+    from sweep import RESULTS, add_run_options, pattern_seeds, sweep, workers
 
 LOWEST = 1 / 1.6
 """A mean below this share of the prototype's, on one or two classes, is marked."""
@@ -61,4 +63,6 @@ def parse() -> argparse.Namespace:
 
 if __name__ == "__main__":
     options = parse()
-    commandline.run(lambda: main(options), as_json=options.json, name="reference_table")
+    commandline.run(
+        lambda: main(options), as_json=options.json, name="reference_table", resumes=True
+    )

@@ -17,20 +17,22 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 import commandline
-from agents import mistake_rate
-from experiments.claims import CLAIMS
-from experiments.methods import REFERENCE
-from experiments.registry import NAMES, SIZES
-from experiments.statistics import by_seed, mean, median, score
-from experiments.verdict import MISSING, NOT_REPRODUCED, REPRODUCED, Claim
-from figures import PICTURES, RESULTS, draw, load
-from progress import duration
-from provenance import commit, software
-from store import Summary, summarise
+
+with commandline.imports("report", "reproduce"):
+    import xarray as xr
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    from agents import mistake_rate
+    from experiments.claims import CLAIMS
+    from experiments.methods import REFERENCE
+    from experiments.registry import NAMES, SIZES
+    from experiments.statistics import by_seed, mean, median, score
+    from experiments.verdict import MISSING, NOT_REPRODUCED, REPRODUCED, Claim
+    from figures import PICTURES, RESULTS, caption, draw, load
+    from progress import duration
+    from provenance import commit, software
+    from store import Summary, summarise
 
 REPORT = RESULTS / "report"
 TEMPLATE = Path(__file__).parent / "report_template.html"
@@ -149,6 +151,7 @@ def page(
     claims: list[Row],
     table: dict[str, list[Cell]],
     pictures: Mapping[str, Mapping[str, Path]],
+    captions: Mapping[str, str],
     costs: Mapping[str, Summary],
     size: str,
 ) -> str:
@@ -162,7 +165,7 @@ def page(
         counts=Counter(row.kind for row in claims),
         table=table,
         figures=[
-            {"name": name, "caption": PICTURES[name].caption, "source": _inline(paths["svg"])}
+            {"name": name, "caption": captions[name], "source": _inline(paths["svg"])}
             for name, paths in pictures.items()
         ],
         undrawn=[name for name in PICTURES if name not in pictures],
@@ -201,7 +204,9 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
     table = reference(results)
     pictures = draw(results, out / "figures")
     out.mkdir(parents=True, exist_ok=True)
-    (out / "index.html").write_text(page(claims, table, pictures, costs, size), encoding="utf-8")
+    captions = {name: caption(name, results) for name in pictures}
+    html = page(claims, table, pictures, captions, costs, size)
+    (out / "index.html").write_text(html, encoding="utf-8")
     record = {
         "size": size,
         "software": software(),

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from experiments.registry import NAMES, experiment
-from progress import duration
-from report import REPORT, print_verdicts, write
-from sweep import RESULTS, add_run_options, described, sweep, workers
+
+with commandline.imports("reproduce", "reproduce"):
+    from experiments.registry import NAMES, experiment
+    from progress import duration
+    from report import REPORT, print_verdicts, write
+    from sweep import RESULTS, add_run_options, described, sweep, workers
 
 
 def main(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -54,4 +56,4 @@ def parse() -> argparse.Namespace:
 
 if __name__ == "__main__":
     options = parse()
-    commandline.run(lambda: main(options), as_json=options.json, name="reproduce")
+    commandline.run(lambda: main(options), as_json=options.json, name="reproduce", resumes=True)

@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from experiments.design import Block, Experiment
-from experiments.registry import NAMES, SIZES, experiment
-from experiments.training import LARGEST_SEED
-from progress import Progress, duration
-from store import Store, Summary, open_store, summarise
-from workers import Outcome, cluster, lost, threads, timed
+
+with commandline.imports("sweep", "reproduce"):
+    from experiments.design import Block, Experiment
+    from experiments.registry import NAMES, SIZES, experiment
+    from experiments.training import LARGEST_SEED
+    from progress import Progress, duration
+    from store import Store, Summary, open_store, summarise
+    from workers import Outcome, cluster, lost, threads, timed
 
 RESULTS = Path("results")
 
@@ -178,4 +180,4 @@ def parse() -> argparse.Namespace:
 
 if __name__ == "__main__":
     options = parse()
-    commandline.run(lambda: main(options), as_json=options.json, name="sweep")
+    commandline.run(lambda: main(options), as_json=options.json, name="sweep", resumes=True)

@@ -6,6 +6,7 @@ Both are executors of `concurrent.futures`, so that the sweep need not know whic
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import socket
 import sys
@@ -79,6 +80,8 @@ def cluster(address: str) -> Iterator[Executor]:
             '--scheduler needs Dask, which is not installed: pip install -e ".[cluster]"'
         ) from None
     _knock(address)
+    # A lost scheduler is said by the sweep, in a line; Dask would log tracebacks before it.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     with (
         distributed.Client(address, set_as_default=False) as client,
         client.get_executor(pure=False) as executor,

@@ -61,6 +61,17 @@ def more_classes(results: Results) -> Figure:
     return figure
 
 
+def edge_note(maps: xr.Dataset) -> str:
+    """For a caption: which α* lie at an end of the range in which they were sought, if any do."""
+    lines = {int(c): optimal_line(_average(maps.sel(classes=c))) for c in maps["classes"]}
+    ends = [f"{line.alpha:g} ({_CLASS_NAMES[c]})" for c, line in lines.items() if line.at_edge]
+    if not ends:
+        return ""
+    return (
+        f" Found at an end of that range, so that the best may lie beyond: α* = {', '.join(ends)}."
+    )
+
+
 def heat_map(
     axes: Axes, scores: xr.DataArray, mst: float, line: Line | None, *, gap: float
 ) -> None:
@@ -155,14 +166,19 @@ def residual_plot(results: Results) -> Figure:
 
 def _residuals(axes: Axes, data: xr.Dataset) -> None:
     residual, error = residuals(data)
-    marks = zip(residual["pattern_seed"].to_numpy(), _MARKS, style.METHOD_COLOURS, strict=False)
+    seeds = residual["pattern_seed"].to_numpy()
     etas = residual["eta"].to_numpy()
-    apart = 0.12 * np.diff(etas).min()  # so that runs do not hide each other
-    for place, (seed, mark, colour) in enumerate(marks):
-        run = {"pattern_seed": seed}
+    # So that runs do not hide each other; more than five share the room of five.
+    places = max(len(seeds), 5)
+    apart, middle = 0.6 / places * np.diff(etas).min(), (places - 1) / 2
+    for place, seed in enumerate(seeds):
+        run, turn = {"pattern_seed": seed}, place // len(_MARKS)
+        mark = _MARKS[place % len(_MARKS)]
+        colour = style.METHOD_COLOURS[(place + turn) % len(style.METHOD_COLOURS)]
         axes.errorbar(
-            etas + (place - 2) * apart, residual.sel(run), error.sel(run), fmt=mark, ms=3.2, lw=0.6,
-            color=colour, mfc="white" if mark in "sD" else colour, mew=0.8, label=str(seed),
+            etas + (place - middle) * apart, residual.sel(run), error.sel(run),
+            fmt=mark, ms=3.2, lw=0.6, color=colour, mfc="white" if mark in "sD" else colour,
+            mew=0.8, label=str(seed),
         )  # fmt: skip
     axes.axhline(0, color=style.INK, lw=0.9, ls="--", zorder=1)
 

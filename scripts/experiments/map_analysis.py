@@ -14,7 +14,10 @@ LARGEST_ETA = 0.6
 """Residuals are looked at up to this η, as in the paper."""
 
 LINES = np.arange(0.05, 0.501, 0.005)
-"""Candidates for α*; each line runs from (η = 0, α = α*) to α = 1."""
+"""Candidates for α*, 0.05 … 0.5; each line runs from (η = 0, α = α*) to α = 1.
+
+A best line at either end says only that α* lies there or beyond.
+"""
 
 Weights = NDArray[np.float64]
 
@@ -36,6 +39,11 @@ class Line(NamedTuple):
     alpha: float
     score: float
     uncorrected: float
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether α* is the smallest or the largest candidate: the best may lie beyond."""
+        return self.alpha in (float(LINES[0]), float(LINES[-1]))
 
 
 def best(scores: xr.DataArray) -> Cell:

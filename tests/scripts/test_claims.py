@@ -143,7 +143,8 @@ def test_an_optimal_line_for_more_classes_only_is_a_condition() -> None:
         return flat(setting) if setting["classes"] == 1 else as_in_the_paper(setting)
 
     verdict = found("F3d", later).verdict
-    assert verdict == f"{REPRODUCED} if the task has two classes, or the task has three classes"
+    more = (f"the task has {n} classes, matched initial weights" for n in ("two", "three"))
+    assert verdict == f"{REPRODUCED} if {', or '.join(more)}"
 
 
 def test_figure_one_follows_from_the_equations() -> None:

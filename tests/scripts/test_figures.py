@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from drawing import maps, style
+from drawing import continuous, maps, style
 from experiments.registry import NAMES
-from figures import PICTURES, draw, save
+from figures import PICTURES, caption, draw, save
 from tests.scripts.worlds import as_in_the_paper, world
 
 SCORED = ("F1", "F3", "F3-published", "F4", "F6", "F7", "table")
@@ -40,6 +40,42 @@ def test_every_axis_has_a_label_with_units(results: dict[str, xr.Dataset]) -> No
     style.plt.close(figure)
 
     assert labels == {"η (model choice)", "α (decay per bin)", "noisy performance (bins)", ""}
+
+
+def test_a_best_line_at_the_end_of_the_range_is_said_in_the_caption(
+    results: dict[str, xr.Dataset],
+) -> None:
+    assert caption("F3", results) == PICTURES["F3"].caption
+    rising = world(lambda setting: 1_000 * (1 - setting["eta"]) * setting["alpha"], ["F3"], 1)
+
+    assert caption("F3", rising).endswith("the best may lie beyond: α* = 0.5 (one class).")
+
+
+def test_every_run_of_more_than_five_is_drawn() -> None:
+    many = world(as_in_the_paper, ("F3", "F4"), 7)
+    with style.styled():
+        figure = maps.residual_plot(many)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    style.plt.close(figure)
+
+    assert labels == [str(seed) for seed in range(7)]
+    looks = {(h.lines[0].get_marker(), h.lines[0].get_color()) for h in handles}
+    assert len(looks) == 7
+
+
+def test_neurons_in_continuous_time_are_those_of_the_first_stored_seed() -> None:
+    weights = xr.DataArray(
+        np.full((1, 2, 100), 0.05),
+        {"classes": [2], "pattern_seed": [3, 7]},
+        ("classes", "pattern_seed", "channel"),
+    )
+    stored = xr.Dataset({"weights": weights}, attrs={"settings": {"common": {"alpha": 0.3}}})
+    with style.styled():
+        figure = continuous.classes({"F2": stored})
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    style.plt.close(figure)
+
+    assert [title[:18] for title in titles] == ["pattern of class 1", "pattern of class 2"]
 
 
 def test_a_figure_without_its_data_is_left_out(

@@ -7,7 +7,7 @@ import pytest
 
 import check_report
 from drawing import style
-from figures import PICTURES
+from figures import PICTURES, caption
 from report import page, reference, rows
 from store import Summary
 from tests.scripts.worlds import as_in_the_paper, world
@@ -24,7 +24,8 @@ def html(tmp_path_factory: pytest.TempPathFactory) -> str:
     svg = tmp_path_factory.mktemp("report") / "F7.svg"
     svg.write_text("<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'></svg>")
     claims = rows(results, COSTS, "quick")
-    return page(claims, reference(results), {"F7": {"svg": svg}}, COSTS, "quick")
+    captions = {"F7": caption("F7", results)}
+    return page(claims, reference(results), {"F7": {"svg": svg}}, captions, COSTS, "quick")
 
 
 def test_the_page_loads_nothing_from_elsewhere(html: str) -> None:

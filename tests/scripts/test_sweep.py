@@ -185,6 +185,18 @@ def test_a_script_ends_with_one_json_object_and_a_line_of_progress(tmp_path: Pat
     assert read(tmp_path / "results" / "quick" / "F1").sizes["bin"] == 200
 
 
+def test_without_an_extra_a_script_says_in_one_line_which(tmp_path: Path) -> None:
+    (tmp_path / "zarr.py").write_text("raise ModuleNotFoundError(name='zarr')")
+    ended = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "sweep.py"), "F1"],
+        capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+
+    assert ended.returncode == 2
+    assert ended.stderr == 'sweep: zarr is not installed: pip install -e ".[reproduce]"\n'
+
+
 @pytest.fixture
 def nowhere() -> str:
     """The address of a scheduler that is not there."""
