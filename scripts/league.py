@@ -73,4 +73,4 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 if __name__ == "__main__":
     chosen = parse()
-    commandline.run(lambda: main(chosen), as_json=chosen.json, name="league")
+    commandline.run(lambda: main(chosen), as_json=chosen.json, name="league", resumes=True)
