@@ -141,9 +141,14 @@ def _parts(places: list[int], threads: int) -> list[list[int]]:
     return [places[a:b] for a, b in itertools.pairwise(cuts)]
 
 
+BYTES_PER_WEIGHT, BYTES_PER_AGENT = 56, 14_000
+"""Peak memory, measured (docs/performance.md): the agents themselves, and their lanes."""
+
+
 def _require_memory(agents: Sequence[Any], task: Task) -> None:
-    """ValueError if the agents' weights and their changes do not fit into this machine's memory."""
-    needed = 2 * 8 * task.n_inputs * (-(-len(agents) // LANES_PER_UNIT) * LANES_PER_UNIT)
+    """ValueError if the agents with all that their training needs exceed this machine's memory."""
+    weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
+    needed = BYTES_PER_WEIGHT * weights + BYTES_PER_AGENT * len(agents)
     there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there:
         raise ValueError(

@@ -200,14 +200,19 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         try:
             first = operator.index(seed)  # type: ignore[arg-type]
         except TypeError:
-            seeds = [None if one is None else int(one) for one in seed]  # type: ignore[union-attr]
-            if len(seeds) != self.num_envs:
-                raise ValueError(
-                    "seed must be a whole number or one seed per environment, "
-                    f"num_envs = {self.num_envs}, got {len(seeds)} seeds"
-                ) from None
-            return seeds
+            return self._listed(seed)
         return [first + i for i in range(self.num_envs)]
+
+    def _listed(self, seeds: Any) -> list[int | None]:
+        """Seeds that are given one by one."""
+        expected = f"seed must be a whole number or one per environment, num_envs = {self.num_envs}"
+        try:
+            listed = [None if seed is None else operator.index(seed) for seed in seeds]
+        except TypeError:
+            raise ValueError(f"{expected}, got {seeds!r}") from None
+        if len(listed) != self.num_envs:
+            raise ValueError(f"{expected}, got {len(listed)} seeds")
+        return listed
 
     # Reset and step
 
@@ -221,10 +226,11 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         mask = self._mask(options)
         which = np.flatnonzero(mask)
         self._seed(seed, which)
+        # Before `clear_rows`, which moves those still over to the front.
+        self._n_over = int(np.count_nonzero(~mask[self._over[: self._n_over]]))
         if self._crowd is not None:
             clear_rows(self._crowd, mask)
         self._begin(which)
-        self._n_over = int(np.count_nonzero(~mask[self._over[: self._n_over]]))
         return self._seen(), {}
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:

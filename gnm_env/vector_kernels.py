@@ -1,7 +1,7 @@
 """Compiled steps of the vector environments: one call for all environments and everything in them.
 
 Most bins hold no spike, so that most environments have little to do in a step: their bins and their
-output are counted on, all at once. `clock` has a row for each number that this takes, int32
+output are counted on, all at once. `clock` has a row for each number that this takes, uint32
 (4, n): the bin shown, the bin at which the environment needs a look (its next spike, or an end),
 the next of its events, and the bin at which the episode is truncated.
 
@@ -115,7 +115,8 @@ def new_crowd(
         held, world, autoreset, limit, most, feedback, tolerance,
         np.zeros((4, n), np.uint32), state, emitted,
         events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
-        observations, np.empty(observations.size, np.uint64), 0,
+        # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
+        observations, np.empty(2 * observations.size, np.uint64), 0,
         over, 0, finals, np.empty(n + 1, np.uint32),
     )  # fmt: skip
 
@@ -167,10 +168,10 @@ def _store(
 @compiled
 def _look(
     i: int,
-    bins: NDArray[np.int32],
-    due: NDArray[np.int32],
-    cursors: NDArray[np.int32],
-    deadlines: NDArray[np.int32],
+    bins: NDArray[np.uint32],
+    due: NDArray[np.uint32],
+    cursors: NDArray[np.uint32],
+    deadlines: NDArray[np.uint32],
     events: NDArray[Any],
     shift: int,
     observations: NDArray[np.int8],

@@ -115,6 +115,17 @@ def _follow(
             values[env, own] = own_keep[k] * values[env, own] + np.float32(actions[env])
 
 
+def _require_spikes(
+    action_space: spaces.Space[Any], previous_action: bool, own_decay: float | None
+) -> None:
+    """ValueError if own spikes are to be shown and the actions are not spikes."""
+    if (previous_action or own_decay is not None) and action_space != spaces.Discrete(2):
+        raise ValueError(
+            "previous_action and own_decay trace spikes, so the actions must be Discrete(2), "
+            f"got {action_space}; leave both out"
+        )
+
+
 def _rate(env: Any) -> float:
     """Spike probability of the inputs, as the environment's task says."""
     task = getattr(env.unwrapped, "task", None)
@@ -150,8 +161,8 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
         rate: spike probability p per channel and bin. None: that of the environment's task.
 
     Raises:
-        ValueError: a decay outside (0, 1], scale <= 0, observations that are not a row, or a rate
-            that nobody knows.
+        ValueError: a decay outside (0, 1], scale <= 0, observations that are not a row, a rate
+            that nobody knows, or own spikes to be traced where actions are amounts.
     """
 
     def __init__(
@@ -172,6 +183,7 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
             rate=rate,
         )
         gym.Wrapper.__init__(self, env)
+        _require_spikes(env.action_space, previous_action, own_decay)
         p = _rate(env) if rate is None else real("rate", rate, low=0.0, high=1.0)
         self._traces = Traces(
             1, env.observation_space, p, decays, scale, previous_action, own_decay
@@ -218,6 +230,7 @@ class VectorSynapticTrace(
             rate=rate,
         )
         VectorWrapper.__init__(self, env)
+        _require_spikes(env.single_action_space, previous_action, own_decay)
         p = _rate(env) if rate is None else real("rate", rate, low=0.0, high=1.0)
         self._traces = Traces(
             env.num_envs,

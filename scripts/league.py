@@ -33,11 +33,10 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     if options.steps is not None and options.steps < 1:
         raise ValueError(f"--steps must be at least 1, got {options.steps}")
     folder = options.out or RESULTS / options.size
+    _one_thread()
     for part in options.part or PARTS:
         wanted = league(part, options.size, options.seeds, options.steps)
-        with ProcessPoolExecutor(
-            options.jobs, multiprocessing.get_context("spawn"), _one_thread
-        ) as executor:
+        with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as executor:
             sweep(wanted, folder / part, executor, repair=options.repair)
     results = [read_league(folder / part) for part in PARTS if (folder / part).exists()]
     table = rows(results)
@@ -47,7 +46,7 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _one_thread() -> None:
-    """Each process keeps to one core, so that times can be compared."""
+    """Each process started from here keeps to one core, so that times can be compared."""
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[name] = "1"
 

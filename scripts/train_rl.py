@@ -27,6 +27,7 @@ from scoring import EVALUATION_SEED, report, score
 
 ALGORITHMS = ("ppo", "ppo-linear", "recurrent-ppo", "dqn")
 FEEDBACK = ("cost", "dense")
+EVALUATIONS = "evaluations.npz"
 STEPS = {1: 2_000_000, 2: 8_000_000}
 """Bins to hear by default, for one class and for more."""
 
@@ -51,14 +52,16 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--evaluations", type=int, default=5, metavar="N",
-        help="evaluations on endless streams during training; 0 for none (default 5)",
+        help="evaluations on endless streams during training, and one at its end; 0 for none: "
+        "the last agent is kept, not the best (default 5)",
     )  # fmt: skip
     parser.add_argument(
         "--runs", type=int, default=100, metavar="N", help="of the final score (default 100)"
     )
     parser.add_argument(
         "--resume", type=Path, metavar="FOLDER",
-        help="go on with a saved agent and its task, up to --steps; the folder is the output too",
+        help="go on with a saved agent and its task, up to --steps, with a learning rate that "
+        "falls anew; the folder is the output too",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="(default runs/ALGO-FEEDBACK)")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON")
@@ -68,27 +71,30 @@ def parser() -> argparse.ArgumentParser:
 
 def main(options: argparse.Namespace) -> dict[str, Any]:
     check(options)
-    import torch
-
     from agents.rl import load
-    from agents.rl.folder import MODEL, describe, save_model
+    from agents.rl.folder import BEST, MODEL, describe, save_model
     from agents.rl.recipes import n_parameters
+
+    import torch  # isort: skip  # after agents.rl, which says what to install if it is missing
 
     torch.set_num_threads(1)  # on networks this small, threads only get in each other's way
     about = wanted(options)
-    folder = options.resume or options.out or Path(f"runs/{about.kind}-{about.feedback}")
+    folder = options.resume or options.out or default_folder(about)
     steps = options.steps or STEPS[min(about.task.n_classes, 2)]
     model = new_model(about, folder, options)
     require_rollout(model, steps)
     model.tensorboard_log = str(folder / "tensorboard")
     if not options.resume:
         describe(folder, about)  # a bad folder shows at once
-        for leftover in ("best_model.zip", "evaluations.npz"):
+        for leftover in (MODEL, BEST, EVALUATIONS):
             (folder / leftover).unlink(missing_ok=True)
 
     heard = model.num_timesteps
     seconds, stopped = learn(model, about, folder, steps, options)
     save_model(folder / MODEL, model)
+    if not options.evaluations:  # the best of earlier evaluations is not this agent
+        for leftover in (BEST, EVALUATIONS):
+            (folder / leftover).unlink(missing_ok=True)
     agent, task, patterns = load(folder)
     result = score(agent, task, patterns, runs=options.runs)
     result |= {
@@ -114,6 +120,13 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     return result
 
 
+def default_folder(about: Any) -> Path:
+    """Where an agent goes if nobody says where."""
+    classes = about.task.n_classes
+    suffix = f"-{classes}-classes" if classes > 1 else ""
+    return Path(f"runs/{about.kind}-{about.feedback}{suffix}")
+
+
 def check(options: argparse.Namespace) -> None:
     """ValueError where a number is out of range; the others are checked where they are used."""
     for name, low in (("steps", 1), ("seed", 0), ("n_envs", 1), ("evaluations", 0), ("runs", 1)):
@@ -137,6 +150,11 @@ def wanted(options: argparse.Namespace) -> Any:
     if options.resume:
         about = described(options.resume)
         refuse_contradictions(about, options)
+        if about.kind == "dqn":
+            raise ValueError(
+                f"{options.resume} holds a DQN agent, which cannot go on: its replay buffer is not "
+                "saved; train a new one with more --steps"
+            )
         return about
     task, kind = made(Task, options), options.algo or "ppo"
     patterns = Patterns.draw(task, options.pattern_seed or 0)
@@ -169,23 +187,34 @@ def new_model(about: Any, folder: Path, options: argparse.Namespace) -> Any:
     from agents.rl import make_rl_agent, training_env
     from agents.rl.folder import MODEL, load_model
 
-    env = training_env(
-        about.task, about.patterns, about.kind, feedback=about.feedback, n_envs=options.n_envs
-    )
+    def envs(n_envs: int | None) -> Any:
+        return training_env(
+            about.task, about.patterns, about.kind, feedback=about.feedback, n_envs=n_envs
+        )
+
     if not options.resume:
-        return make_rl_agent(about.kind, env, options.seed)
-    model = load_model(folder / MODEL, about.kind, env=env)
-    env.seed(options.seed + model.num_timesteps)  # not the trials that it has heard already
+        return make_rl_agent(about.kind, envs(options.n_envs), options.seed)
+    model = load_model(folder / MODEL, about.kind)
+    if options.n_envs not in (None, model.n_envs):
+        raise ValueError(
+            f"{options.resume} was trained in {model.n_envs} environments side by side, which its "
+            f"rollouts go by, not in {options.n_envs}; leave --n-envs out"
+        )
+    model.set_env(envs(model.n_envs))
+    # Neither the trials that it has heard already nor the same exploration again.
+    model.set_random_seed(options.seed + model.num_timesteps)
     return model
 
 
 def require_rollout(model: Any, steps: int) -> None:
-    """ValueError if `steps` leaves less than the model hears before it first learns."""
-    rollout = model.n_envs * getattr(model, "n_steps", 0) or model.learning_starts + model.n_envs
-    if steps - model.num_timesteps < rollout:
+    """ValueError if `steps` leaves no more than the model hears before it first learns."""
+    buffered = hasattr(model, "learning_starts")
+    rollout = model.learning_starts if buffered else model.n_envs * model.n_steps
+    if steps - model.num_timesteps <= rollout:
         done = f" of which {model.num_timesteps:,} are done" if model.num_timesteps else ""
         raise ValueError(
-            f"--steps must leave room for one rollout of {rollout:,} bins, got {steps:,}{done}"
+            f"--steps must leave room for more than one rollout of {rollout:,} bins, at the end of "
+            f"which the learning rate is 0, got {steps:,}{done}"
         )
 
 
@@ -199,7 +228,7 @@ def learn(
     if options.evaluations:
         callback = Evaluation(
             folder, about.task, about.patterns, about.senses,
-            every=steps // options.evaluations // model.n_envs,
+            every=(steps - model.num_timesteps) // options.evaluations // model.n_envs,
             seed=EVALUATION_SEED + options.runs,
         )  # fmt: skip
         callback.go_on()

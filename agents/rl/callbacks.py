@@ -73,12 +73,25 @@ class Evaluation(EvalCallback):
         """Take up the evaluations of an earlier run of the same agent, and its best."""
         assert self.log_path is not None
         path = Path(self.log_path + ".npz")
-        if path.exists():
+        if not path.exists():
+            return
+        try:
             with np.load(path) as earlier:
                 self.evaluations_timesteps = earlier["timesteps"].tolist()
                 self.evaluations_results = earlier["results"].tolist()
                 self.evaluations_length = earlier["ep_lengths"].tolist()
             self.best_mean_reward = max(map(float, map(np.mean, self.evaluations_results)))
+        except Exception as error:  # a damaged file fails in any way
+            raise ValueError(
+                f"{path} is not readable ({type(error).__name__}: {error}); "
+                "remove it to go on without the earlier evaluations"
+            ) from None
+
+    def _on_training_end(self) -> None:
+        """The last model too, which learned with the smallest steps."""
+        if self.evaluations_timesteps[-1:] != [self.num_timesteps]:
+            self.eval_freq = 1
+            self._on_step()
 
     def _on_step(self) -> bool:
         start = time.monotonic()

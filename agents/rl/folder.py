@@ -12,7 +12,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -111,9 +110,15 @@ def save(
 ) -> None:
     """Save a model with all that is needed to score it or to go on. `load` reads it.
 
-    Raises ValueError if the folder cannot be written.
+    Raises ValueError if the folder cannot be written, or the model is not of this kind.
     """
-    senses = RECIPES[kind].senses if senses is None else senses
+    recipe = RECIPES[choice("kind", kind, tuple(RECIPES))]
+    if not isinstance(model, recipe.algorithm):
+        raise ValueError(
+            f"{kind} is a {recipe.algorithm.__name__}, and the model is a {type(model).__name__}; "
+            "keep a model of your own with its own save"
+        )
+    senses = recipe.senses if senses is None else senses
     describe(folder, Description(kind, senses, feedback, task, patterns))
     save_model(Path(folder) / MODEL, model)
 
@@ -137,7 +142,7 @@ def load_model(path: str | os.PathLike[str], kind: str, **arguments: Any) -> Bas
         model: BaseAlgorithm = algorithm.load(os.fspath(path), device="cpu", **arguments)
     except FileNotFoundError:
         raise ValueError(f"there is no model {path}; train and save again") from None
-    except (zipfile.BadZipFile, ValueError, KeyError, RuntimeError, EOFError, OSError) as error:
+    except Exception as error:  # a zip of anything else fails in any way
         raise ValueError(
             f"{path} is not a readable {algorithm.__name__} model "
             f"({type(error).__name__}: {error}); train and save again"

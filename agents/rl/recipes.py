@@ -187,19 +187,29 @@ def make_rl_agent(
         kind: a key of `RECIPES`.
         env: `training_env(…)`, or a `gnm/PatternTrial-v0` from `gym.make`, which is wrapped here.
         seed: of the initial weights, of exploration and of the stream.
-        spike_probability: at the start, per bin.
+        spike_probability: at the start, per bin, between 0 and 1. Not for DQN, which begins with
+            10,000 random answers to fill its buffer and then prefers silence.
         settings: keywords of SB3's class, which override the recipe's.
 
     Raises:
-        ValueError: an unknown kind, a probability outside (0, 1), or a vector environment that does
-            not show what this kind needs.
+        ValueError: an unknown kind, a probability outside (0, 1), or an environment that does not
+            show what this kind needs or takes amounts for actions.
     """
     recipe = RECIPES[choice("kind", kind, tuple(RECIPES))]
     p = real("spike_probability", spike_probability, 0.0, 1.0, above=0.0)
+    if p == 1.0:
+        raise ValueError("spike_probability must be < 1, got 1.0")
     if isinstance(env, gym.Env):
+        if env.observation_space.dtype != np.int8:
+            raise ValueError(
+                f"{kind} puts its own senses around an environment of raw bits, and this one shows "
+                f"{env.observation_space}: give it unwrapped"
+            )
+        _require_spikes(env.action_space)
         env = recipe.senses.wrap(env)
     else:
         _require_senses(env, recipe.senses, kind)
+        _require_spikes(env.action_space)
     n_envs = env.num_envs if isinstance(env, VecEnv) else 1
     keywords = {**recipe.settings(n_envs), "device": "cpu", **settings}
     model = recipe.algorithm(recipe.policy, env, seed=whole("seed", seed, low=0), **keywords)
@@ -208,8 +218,10 @@ def make_rl_agent(
 
 
 def n_parameters(model: BaseAlgorithm) -> int:
-    """Number of trainable parameters, the critic's included."""
-    return sum(p.numel() for p in model.policy.parameters() if p.requires_grad)
+    """Number of trainable parameters: the critic's are among them, DQN's target network is not."""
+    policy: Any = model.policy
+    trained = policy.q_net if isinstance(model, DQN) else policy
+    return sum(p.numel() for p in trained.parameters() if p.requires_grad)
 
 
 def _require_senses(env: Any, senses: Senses, kind: str) -> None:
@@ -222,6 +234,14 @@ def _require_senses(env: Any, senses: Senses, kind: str) -> None:
         raise ValueError(
             f"{kind} needs {'traces' if senses.decays else 'the raw bits'} as observations, "
             f"got {env.observation_space}; training_env(task, patterns, {kind!r}) gives them"
+        )
+
+
+def _require_spikes(action_space: gym.Space[Any]) -> None:
+    if action_space != gym.spaces.Discrete(2):
+        raise ValueError(
+            f"agents answer with spikes, so the actions must be Discrete(2), got {action_space}; "
+            'make the environment with output="spikes"'
         )
 
 

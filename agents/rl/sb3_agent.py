@@ -65,6 +65,16 @@ class SB3Agent(PolicyAgent):
         bits = np.atleast_2d(observed)
         n = len(bits)
         memory: Memory | None = state
+        if bits.shape != (n, self.n_inputs):
+            raise ValueError(
+                f"observations must have shape ({self.n_inputs},) or (n, {self.n_inputs}) like "
+                f"those of the task that was trained on, got {observed.shape}"
+            )
+        if memory is not None and len(memory.actions) != n:
+            raise ValueError(
+                f"state is that of {len(memory.actions)} streams, and there are observations of "
+                f"{n}: hand back the state of the same streams, or None"
+            )
         begins = np.full(n, memory is None)
         if episode_start is not None:
             begins |= np.asarray(episode_start, np.bool_).reshape(n)

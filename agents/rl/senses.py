@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import gymnasium as gym
+import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
@@ -40,7 +41,9 @@ class Senses:
     rising_edge: bool = False
 
     def __post_init__(self) -> None:
-        decays = tuple(real("decays", float(d), 0.0, 1.0, above=0.0) for d in self.decays)
+        decays = tuple(
+            real("decays", float(d), 0.0, 1.0, above=0.0) for d in np.atleast_1d(self.decays)
+        )
         object.__setattr__(self, "decays", decays)
         object.__setattr__(self, "scale", real("scale", self.scale, above=0.0))
         if not decays and (self.previous_action or self.own_decay is not None):

@@ -115,7 +115,7 @@ def league(
         Axis("learner", tuple(rows), settings=tuple(rows.values()), long_name="who learns"),
         pattern_seeds(seeds),
     )
-    common = {**RUN, **({"budget": steps} if steps else {})}
+    common = {**RUN, **({"budget": steps} if steps and part == "rl" else {})}
     return Experiment(
         f"league-{part}",
         "Learners side by side, by bins heard",

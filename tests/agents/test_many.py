@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -62,13 +63,10 @@ def test_the_loop_refuses_numbers_out_of_range_too(keywords: dict[str, Any], mes
 
 def test_agents_that_would_not_fit_into_memory_are_refused_before_anything_is_allocated() -> None:
     task = Task(n_inputs=50_000_000, rate=1e-9, pattern_bins=1)
-
-    class Sized(list[Any]):
-        def __len__(self) -> int:
-            return 1_000_000
-
-    with pytest.raises(ValueError, match=r"needs [\d,.]+ GiB, this machine has [\d,.]+"):
-        lane_groups(Sized([None]), task, None, 1)  # type: ignore[arg-type]
+    weights = np.broadcast_to(0.1, 50_000_000)  # takes no room
+    agents = [SimpleNamespace(weights=weights)] * 10_000
+    with pytest.raises(ValueError, match=r"needs 26,[\d,.]+ GiB, this machine has [\d,.]+"):
+        lane_groups(agents, task, None, 1)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("run", ["loop", "lanes"])

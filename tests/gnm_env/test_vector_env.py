@@ -222,6 +222,32 @@ class TestLikeTheSingleEnvironments:
             actions = np.zeros(NUM_ENVS, int)
             assert_same(ours.step(actions), theirs.step(actions))
 
+    @each_id
+    def test_episodes_of_one_dense_bin_have_room_for_their_last_and_their_first(
+        self, id: str
+    ) -> None:
+        """Under SAME_STEP a row that ends is shown twice within one step."""
+        task = {"rate": 0.95, "max_episode_steps": 1, "background_bins": 3}
+        kwargs = {key: task[key] for key in task if id == TRIAL or key != "background_bins"}
+        envs = native(id, 64, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
+        envs.reset(seed=0)
+        for _ in range(50):
+            observations, *_ = envs.step(np.ones(64, int))
+            assert 0.9 < observations.mean() < 1.0
+
+    @each_id
+    def test_environments_that_have_ended_may_be_reset_one_after_the_other(self, id: str) -> None:
+        envs = native(id, 3, autoreset_mode=AutoresetMode.DISABLED, max_episode_steps=2)
+        envs.reset(seed=0)
+        for _ in range(2):
+            _, _, terminated, truncated, _ = envs.step(np.zeros(3, int))
+        assert (terminated | truncated).all()
+        envs.reset(options={"reset_mask": np.array([True, True, False])})
+        with pytest.raises(ResetNeeded, match="environment 2 has ended"):
+            envs.step(np.zeros(3, int))
+        envs.reset(options={"reset_mask": np.array([False, False, True])})
+        envs.step(np.zeros(3, int))
+
 
 class TestArrays:
     @each_id
@@ -451,6 +477,12 @@ class TestBadInput:
     @pytest.mark.parametrize("seed", [[1, 2], [1, 2, 3, 4, 5, 6], []])
     def test_a_list_of_seeds_of_the_wrong_length(self, id: str, seed: Any) -> None:
         with pytest.raises(ValueError, match=rf"num_envs = 5, got {len(seed)} seeds"):
+            native(id).reset(seed=seed)
+
+    @each_id
+    @pytest.mark.parametrize("seed", [1.5, "ab", [1, 2, 3, 4, 0.5]])
+    def test_seeds_that_are_no_whole_numbers(self, id: str, seed: Any) -> None:
+        with pytest.raises(ValueError, match="seed must be a whole number or one per environment"):
             native(id).reset(seed=seed)
 
     @each_id

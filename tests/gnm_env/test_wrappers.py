@@ -232,3 +232,13 @@ def test_environments_that_cannot_be_wrapped_are_refused_with_a_reason():
         env = RisingEdge(gym.make(STREAM))
         env.reset()
         env.step(2)
+
+
+@pytest.mark.parametrize("extra", [{"previous_action": True}, {"own_decay": 0.1}], ids=str)
+def test_own_spikes_are_not_traced_where_actions_are_amounts(extra):
+    SynapticTrace(gym.make(TRIAL, output="graded"))
+    with pytest.raises(ValueError, match=r"the actions must be Discrete\(2\), got Box"):
+        SynapticTrace(gym.make(TRIAL, output="graded"), **extra)
+    many = gym.make_vec(TRIAL, 2, vectorization_mode="vector_entry_point", output="graded")
+    with pytest.raises(ValueError, match=r"the actions must be Discrete\(2\), got Box"):
+        VectorSynapticTrace(many, **extra)

@@ -121,6 +121,12 @@ def test_every_learner_that_learns_has_a_style_of_its_own():
     assert len(set(figures_league.STYLES.values())) == len(figures_league.STYLES)
 
 
+def test_steps_shorten_the_training_of_rl_agents_alone():
+    pytest.importorskip("stable_baselines3")
+    assert league.league("rl", "quick", steps=5).blocks()[0].settings[0]["budget"] == 5
+    assert "budget" not in league.league("neurons", "quick", steps=5).blocks()[0].settings[0]
+
+
 @pytest.mark.parametrize("size", ["quick", "full"])
 def test_the_rl_part_is_data_that_a_store_can_keep(size):
     pytest.importorskip("stable_baselines3")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3 import PPO
 
 from agents import noisy_performance
-from agents.rl import load, make_rl_agent, save, training_env
+from agents.rl import TRACES, SB3Agent, load, make_rl_agent, save, training_env
 from gnm_env import Patterns, Task
 
 TASK = Task(n_classes=2, onset_probability=0.05)
@@ -34,9 +35,8 @@ def folder(tmp_path, model):
 def test_a_saved_agent_comes_back_with_task_and_patterns_and_scores_the_same(folder, model):
     agent, task, patterns = load(folder)
     assert task == TASK and patterns == PATTERNS
-    scores = [
-        noisy_performance(a, TASK, PATTERNS, runs=5, seed=9) for a in (agent, load(folder)[0])
-    ]
+    before = SB3Agent(model, TASK, TRACES)
+    scores = [noisy_performance(a, TASK, PATTERNS, runs=5, seed=9) for a in (agent, before)]
     np.testing.assert_array_equal(*scores)
     shown = np.random.default_rng(0).random((20, TASK.n_inputs + 2)).astype(np.float32)
     actions = [m.predict(shown, deterministic=True)[0] for m in (agent.policy, model)]
@@ -66,6 +66,24 @@ def test_the_best_model_is_preferred_to_the_last(folder, model):
 def test_damaged_files_are_refused_by_name(folder, name, text, message):
     (folder / name).write_text(text)
     with pytest.raises(ValueError, match=message):
+        load(folder)
+
+
+def test_a_zip_of_something_else_is_refused(folder, tmp_path):
+    with zipfile.ZipFile(folder / "model.zip", "w") as file:
+        file.writestr("letter.txt", "hello")
+    with pytest.raises(ValueError, match="not a readable PPO model"):
+        load(folder)
+
+
+def test_a_model_of_another_algorithm_is_refused(folder, tmp_path, model):
+    dqn = make_rl_agent("dqn", training_env(TASK, PATTERNS, "dqn", n_envs=2))
+    with pytest.raises(ValueError, match="ppo is a PPO, and the model is a DQN"):
+        save(tmp_path / "other", dqn, "ppo", TASK, PATTERNS)
+    with pytest.raises(ValueError, match="kind must be one of"):
+        save(tmp_path / "other", model, "a2c", TASK, PATTERNS)
+    dqn.save(folder / "model.zip")
+    with pytest.raises(ValueError, match="not a readable PPO model"):
         load(folder)
 
 

@@ -13,6 +13,7 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import DQN, PPO
 
 from agents.rl import RECIPES, TRACES, make_rl_agent, training_env
+from agents.rl.recipes import n_parameters
 from gnm_env import Patterns, Task
 
 TASK = Task()
@@ -78,6 +79,18 @@ def test_a_single_environment_is_seen_through_traces():
             "spike_probability must be > 0",
         ),
         (
+            lambda: make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0"), spike_probability=1.0),
+            "spike_probability must be < 1",
+        ),
+        (
+            lambda: make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0", output="graded")),
+            "the actions must be Discrete",
+        ),
+        (
+            lambda: make_rl_agent("ppo", TRACES.wrap(gym.make("gnm/PatternTrial-v0"))),
+            "give it unwrapped",
+        ),
+        (
             lambda: make_rl_agent("ppo", gym.make_vec(
                 "gnm/PatternTrial-v0", 2, vectorization_mode="vector_entry_point")),
             "training_env makes one",
@@ -87,6 +100,11 @@ def test_a_single_environment_is_seen_through_traces():
 def test_bad_input_is_refused_with_a_remedy(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_the_target_network_of_a_dqn_does_not_count():
+    model = make_rl_agent("dqn", training_env(TASK, PATTERNS, "dqn", n_envs=2))
+    assert n_parameters(model) == 102 * 64 + 64 + 64 * 64 + 64 + 64 * 2 + 2
 
 
 def test_every_recipe_gives_its_reasons():

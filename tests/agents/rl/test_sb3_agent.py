@@ -132,3 +132,15 @@ def test_senses_that_a_policy_was_not_trained_with_are_refused():
         SB3Agent(model, TASK, RAW)
     with pytest.raises(ValueError, match="decays is empty"):
         Senses(previous_action=True)
+
+
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [((TASK.n_inputs + 3,), "observations must have shape"), ((2, 4), "observations must have"),
+     ((3, TASK.n_inputs), "state is that of 2 streams, and there are observations of 3")],
+)  # fmt: skip
+def test_observations_of_another_task_and_states_of_other_streams_are_refused(shape, message):
+    agent = SB3Agent(make_rl_agent("ppo", trial_env()), TASK, TRACES)
+    _, state = agent.predict(np.zeros((2, TASK.n_inputs), np.int8))
+    with pytest.raises(ValueError, match=message):
+        agent.predict(np.zeros(shape, np.int8), state)
