@@ -19,9 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import commandline
-from experiments.league import PARTS, league
-from figures_league import draw, read_league, rows, text_table
-from sweep import pattern_seeds, sweep
+
+with commandline.imports("league", "pictures,reproduce,rl"):
+    from experiments.league import PARTS, league
+    from figures_league import draw, read_league, rows, text_table
+    from sweep import pattern_seeds, sweep
 
 RESULTS = Path("results") / "league"
 
