@@ -48,8 +48,8 @@ STYLES = {
 
 
 def read_league(folder: Path) -> xr.Dataset:
-    """One part of the league; where nothing was scored there is NaN."""
-    results = read(folder)
+    """One part of the league, as far as it is; where nothing was scored there is NaN."""
+    results = read(folder, unfinished=True)
     settings = results.attrs["settings"]["protocol"]
     milestones = [*settings["milestones"], -1]
     results = results.assign_coords(milestone=milestones)
@@ -68,7 +68,15 @@ def rows(results: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
 def _cells(part: xr.Dataset) -> Iterator[xr.Dataset]:
     for classes in part["classes"].to_numpy():
         for learner in part["learner"].to_numpy():
-            yield part.sel(classes=classes, learner=learner)
+            cell = _finished(part.sel(classes=classes, learner=learner))
+            if cell.sizes["pattern_seed"]:
+                yield cell
+
+
+def _finished(part: xr.Dataset) -> xr.Dataset:
+    """Without the pattern seeds on which a learner is still to be trained."""
+    done = part["score"].sel(milestone=-1).notnull()
+    return part.isel(pattern_seed=np.flatnonzero(done.to_numpy()))
 
 
 def _row(cell: xr.Dataset) -> dict[str, Any]:
@@ -181,10 +189,10 @@ def draw(results: Sequence[xr.Dataset], folder: Path) -> list[Path]:
 
 def _curves(axes: Any, results: Sequence[xr.Dataset], classes: int) -> None:
     for part in results:
-        present = part.sel(classes=classes)
-        for name in present["learner"].to_numpy():
+        for cell in _cells(part.sel(classes=[classes])):
+            name = str(cell["learner"].item())
             if name in STYLES:
-                _curve(axes, present.sel(learner=name), str(name))
+                _curve(axes, cell, name)
     axes.axhline(SILENT_SCORE, color="0.4", linewidth=0.8, linestyle=(0, (1, 2)))
     axes.axvline(results[0].attrs["budget"][classes], color="0.7", linewidth=0.8, zorder=0)
     axes.annotate("silent", (0.01, SILENT_SCORE), xycoords=("axes fraction", "data"),
@@ -222,12 +230,12 @@ def _scores(
 ) -> None:
     """Each pattern seed's last score as a point, the mean with its interval above it."""
     for part in results:
-        last = part["score"].sel(classes=classes, milestone=-1)
-        for name in part["learner"].to_numpy():
+        for cell in _cells(part.sel(classes=[classes])):
+            name = str(cell["learner"].item())
             if name not in names:
                 continue
-            style, row = STYLES[name], names.index(str(name))
-            scores = last.sel(learner=name).to_numpy()
+            style, row = STYLES[name], names.index(name)
+            scores = cell["score"].sel(milestone=-1).to_numpy()
             axes.plot(scores, np.full(len(scores), row), style.mark, color=style.colour,
                       markersize=4, alpha=0.45, markeredgewidth=0)  # fmt: skip
             value, low, high = mean(scores)

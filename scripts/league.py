@@ -36,11 +36,13 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
         raise ValueError(f"--steps must be at least 1, got {options.steps}")
     folder = options.out or RESULTS / options.size
     _one_thread()
-    for part in options.part or PARTS:
+    for part in () if options.so_far else options.part or PARTS:
         wanted = league(part, options.size, options.seeds, options.steps)
         with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as executor:
             sweep(wanted, folder / part, executor, repair=options.repair)
     results = [read_league(folder / part) for part in PARTS if (folder / part).exists()]
+    if not results:
+        raise ValueError(f"there is no league in {folder}: leave --so-far out to train one")
     table = rows(results)
     print(text_table(table))
     pictures = draw(results, folder)
@@ -67,6 +69,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     add("--steps", type=int, metavar="N", help="bins that RL agents hear, to try things out")
     add("--out", type=Path, metavar="FOLDER", help=f"default: {RESULTS}/SIZE")
+    add("--so-far", action="store_true", help="train nothing: print and draw what is finished")
     add("--repair", action="store_true", help="compute damaged blocks again")
     add("--json", action="store_true", help="end with one JSON object")
     return parser.parse_args(arguments)

@@ -150,11 +150,14 @@ def open_store(folder: Path, experiment: Experiment, *, repair: bool = False) ->
         yield Store(folder, experiment, entries)
 
 
-def read(folder: Path) -> xr.Dataset:
-    """All results of a finished store, in memory. Raises StoreError if there is anything amiss."""
+def read(folder: Path, *, unfinished: bool = False) -> xr.Dataset:
+    """All results of a store, in memory. Raises StoreError if there is anything amiss.
+
+    With `unfinished` a store may lack blocks; there the numbers are blank, NaN or −1.
+    """
     entries = _entries(folder)
     summary = _summary(entries)
-    if not summary.complete:
+    if not summary.complete and not unfinished:
         raise StoreError(
             f"{folder} is not finished: {summary.done} of {summary.blocks} blocks are there; "
             f"run the sweep {entries[0]['settings']['experiment']} again to go on"

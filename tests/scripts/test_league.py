@@ -107,6 +107,23 @@ def test_the_table_puts_the_best_first_with_its_numbers():
     assert len({len(line) for line in text.splitlines() if line.startswith("|")}) == 1
 
 
+def test_what_is_not_finished_is_left_out_of_table_and_picture(tmp_path):
+    part = made_up({"GNM, ALL": 500.0, "LIF, ALL": 700.0, "PPO, cost": 9_000.0})
+    part["score"].loc[{"learner": "GNM, ALL"}] = np.nan
+    part["score"].loc[{"learner": "LIF, ALL", "pattern_seed": 2}] = np.nan
+    table = figures_league.rows([part])
+    assert [(row["learner"], row["seeds"]) for row in table] == [("PPO, cost", 4), ("LIF, ALL", 3)]
+    assert all(path.exists() for path in figures_league.draw([part], tmp_path))
+
+
+def test_without_any_league_so_far_it_says_so(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    import league as script
+
+    with pytest.raises(ValueError, match=r"there is no league in .* leave --so-far out"):
+        script.main(script.parse(["--so-far", "--out", str(tmp_path)]))
+
+
 def test_the_picture_is_drawn_from_the_results_alone(tmp_path):
     parts = [made_up({"GNM, ALL": 500.0}), made_up({"PPO, cost": 9_000.0})]
     paths = figures_league.draw(parts, tmp_path)
