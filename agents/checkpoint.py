@@ -42,6 +42,7 @@ _BIT_GENERATORS = {
     )
 }
 _Class = TypeVar("_Class", bound=type)
+_Agent = TypeVar("_Agent")
 
 
 @dataclass(frozen=True)
@@ -174,6 +175,17 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
         return Checkpoint(agent, task, patterns, _generator(header.get("rng")))
     except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{path} is not a valid {kind} checkpoint: {error}") from None
+
+
+def load_agent(path: str | os.PathLike[str], cls: type[_Agent]) -> _Agent:
+    """The agent of a checkpoint; ValueError if it is damaged, or its agent no `cls`."""
+    agent = load_checkpoint(path).agent
+    if not isinstance(agent, cls):
+        raise ValueError(
+            f"{path} holds a {type(agent).__name__}, not a {cls.__name__}; "
+            "use agents.load_checkpoint for checkpoints of any kind"
+        )
+    return agent
 
 
 def _generator(state: dict[str, Any] | None) -> Generator | None:

@@ -22,6 +22,14 @@ from gnm_env.task import Patterns, Task
 LANES_PER_UNIT = 32
 """Agents are handed to threads in multiples of this many, the width of the widest block."""
 
+BYTES_PER_WEIGHT, BYTES_PER_AGENT = 56, 14_000
+"""Peak memory of training, the agents included; a benchmark checks it.
+
+Per weight: it and its last change, in the agent and side by side (32), the agent's room for the
+input spikes of a trial (16), copies while they change hands (8). Per agent: its Python objects and
+its room for the bins of a trial.
+"""
+
 
 def train_many(
     agents: Sequence[Any],
@@ -114,7 +122,8 @@ def _write_back(units: list[Unit]) -> None:
 def thread_count(threads: int | None) -> int:
     """`threads`, checked; None: one per core that this process may use."""
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        can_tell = hasattr(os, "sched_getaffinity")
+        return len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
     return whole("threads", threads, low=1)
 
 
@@ -139,10 +148,6 @@ def _parts(places: list[int], threads: int) -> list[list[int]]:
     blocks = -(-len(places) // LANES_PER_UNIT)
     cuts = np.linspace(0, blocks, min(threads, blocks) + 1).round().astype(int) * LANES_PER_UNIT
     return [places[a:b] for a, b in itertools.pairwise(cuts)]
-
-
-BYTES_PER_WEIGHT, BYTES_PER_AGENT = 56, 14_000
-"""Peak memory, measured (docs/performance.md): the agents themselves, and their lanes."""
 
 
 def _require_memory(agents: Sequence[Any], task: Task) -> None:

@@ -282,13 +282,7 @@ class NeuronAgent:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> NeuronAgent:
         """Load an agent; ValueError if the file is missing, damaged or of another kind."""
-        agent = checkpoint.load_checkpoint(path).agent
-        if not isinstance(agent, cls):
-            raise ValueError(
-                f"{path} holds a {type(agent).__name__}, not a {cls.__name__}; "
-                "use agents.load_checkpoint for checkpoints of any kind"
-            )
-        return agent
+        return checkpoint.load_agent(path, cls)
 
     @classmethod
     def from_checkpoint(

@@ -86,15 +86,13 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     model.tensorboard_log = str(folder / "tensorboard")
     if not options.resume:
         describe(folder, about)  # a bad folder shows at once
-        for leftover in (MODEL, BEST, EVALUATIONS):
-            (folder / leftover).unlink(missing_ok=True)
+        remove(folder, MODEL, BEST, EVALUATIONS)
 
     heard = model.num_timesteps
     seconds, stopped = learn(model, about, folder, steps, options)
     save_model(folder / MODEL, model)
     if not options.evaluations:  # the best of earlier evaluations is not this agent
-        for leftover in (BEST, EVALUATIONS):
-            (folder / leftover).unlink(missing_ok=True)
+        remove(folder, BEST, EVALUATIONS)
     agent, task, patterns = load(folder)
     result = score(agent, task, patterns, runs=options.runs)
     result |= {
@@ -118,6 +116,12 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     if stopped:
         print(f"stopped early; go on with --resume {folder} --steps {steps}")
     return result
+
+
+def remove(folder: Path, *names: str) -> None:
+    """Remove what an earlier run left, where it did."""
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
 
 
 def default_folder(about: Any) -> Path:

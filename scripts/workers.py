@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import socket
 import sys
 import time
@@ -25,6 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from agents.many import thread_count
 from experiments.design import Block
 
 CONNECTION_SECONDS = 5
@@ -45,16 +45,11 @@ def timed(compute: Callable[[Block], Mapping[str, Any]], block: Block) -> Outcom
 @contextmanager
 def threads(count: int | None = None) -> Iterator[Executor]:
     """`count` threads, one per core by default. The compiled loops do not hold the GIL."""
-    executor = ThreadPoolExecutor(count or _cores(), thread_name_prefix="block")
+    executor = ThreadPoolExecutor(thread_count(count), thread_name_prefix="block")
     try:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def lost(error: Exception) -> bool:

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from agents.many import BYTES_PER_AGENT, BYTES_PER_WEIGHT
 from benchmarks.rows import Findings, Row, Target
 from benchmarks.timing import Settings, Skip
 from gnm_env import Task
@@ -136,14 +137,13 @@ def memory(settings: Settings) -> Findings:
 def stated(n_inputs: int, lanes: int, longest: int) -> float:
     """Most bytes that `train_many` may take: O(N · lanes + longest trial · block).
 
-    Per neuron and input (56): weights and their last change, in the agent and side by side (32),
-    the agent's room for the input spikes of a trial (16), copies while they change hands (8). Per
-    neuron (14,000): its Python objects and its room for the bins of a trial. Per bin of the longest
-    trial: potential and whether it is above threshold for one block of 32 neurons (512), its offset
+    Per weight and per neuron: see `agents.many.BYTES_PER_WEIGHT`. Per bin of the longest trial:
+    potential and whether it is above threshold for one block of 32 neurons (512), its offset
     (16) and its spikes (4 bytes each), in buffers that grow by doubling.
     """
     spikes = Task().rate * n_inputs
-    return 56 * n_inputs * lanes + 14_000 * lanes + (512 + 16 + 8 * spikes) * longest + 4 * MIB
+    neurons = lanes * (BYTES_PER_WEIGHT * n_inputs + BYTES_PER_AGENT)
+    return neurons + (512 + 16 + 8 * spikes) * longest + 4 * MIB
 
 
 def program(text: str, *arguments: Any, **environment: str) -> str:
