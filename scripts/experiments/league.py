@@ -41,7 +41,7 @@ MATCHED = {1: 1_600_000, 2: 8_000_000}
 
 PARTS = ("neurons", "rl")
 RUN: dict[str, Any] = {"runs": 100, "cap": 10_000}
-SEEDS = {"quick": (3, 1), "full": (10, 5)}
+SEEDS = {"quick": (3, 1), "full": (10, 10)}
 """Number of pattern seeds of the neurons, and of the RL agents."""
 CLASSES = {"quick": (1,), "full": (1, 2)}
 FIRST_SEED = 100
@@ -110,10 +110,11 @@ def league(
     rows = NEURON_LEARNERS if part == "neurons" else RL_LEARNERS
     count = SEEDS[size][part == "rl"]
     seeds = seeds or tuple(range(FIRST_SEED, FIRST_SEED + count))
+    # Seeds first: a run that is stopped has every learner on the patterns that it came to.
     axes = (
+        pattern_seeds(seeds),
         class_counts(*CLASSES[size]),
         Axis("learner", tuple(rows), settings=tuple(rows.values()), long_name="who learns"),
-        pattern_seeds(seeds),
     )
     common = {**RUN, **({"budget": steps} if steps and part == "rl" else {})}
     return Experiment(
