@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,23 +22,25 @@ class ReusedRows:
     """
 
     def __init__(self, n_rows: int, length: int) -> None:
-        self._shape = (n_rows, length)
-        self._written: list[int] = []
+        self._n_rows, self._length = n_rows, length
+        self._written: Sequence[int] = ()
         self._renew()
         self._unlent = self._references()
 
     def _renew(self) -> None:
-        self._block = np.empty(self._shape, object)
+        self._rows = [np.empty(self._length, object) for _ in range(self._n_rows)]
 
     def _references(self) -> int:
-        """References to the block; every row that is lent, and every part of one, has one more."""
-        return sys.getrefcount(self._block)
+        """References to the row that has most; who is lent a row, or a part of one, has another."""
+        return max(map(sys.getrefcount, self._rows))
 
-    def rows(self, places: list[int]) -> list[NDArray[Any]]:
+    def rows(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """The rows, each of them None everywhere; the caller will write to `places` only."""
         if self._references() > self._unlent:
             self._renew()
-        elif self._written:
-            self._block[:, self._written] = None
+        else:
+            for row in self._rows:
+                for place in self._written:
+                    row[place] = None
         self._written = places
-        return list(self._block)
+        return self._rows.copy()

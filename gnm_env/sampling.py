@@ -209,6 +209,135 @@ def _sort(values: NDArray[np.int64], start: int, stop: int) -> None:
         gap //= 3
 
 
+DRAFT = np.dtype(
+    [
+        ("first_bin", np.int64),
+        ("first", np.int64),  # the trial's first occurrence
+        ("class_", np.int64),  # whose occurrences were drawn last, and how many of them are still
+        ("count", np.int64),  # to be placed (−1: none, the next class can be drawn)
+        ("label", np.int64),
+        ("end", np.int64),  # the occurrence after the trial's last so far
+        ("occurrence", np.int64),  # the next to be laid out
+        ("noise_done", np.int64),  # bins of noise that are laid out
+        ("position", np.int64),  # the last 1 in the present noise (−1: none yet)
+        ("bin_", np.int64),  # the next bin
+        ("n_events", np.int64),  # spikes so far
+    ]
+)
+"""How far a trial has been drawn, so that drawing can go on in longer buffers; shape (1,).
+
+Once all is drawn, `bin_` and `occurrence` are those that follow the trial's last, and `label` is
+its aggregate label.
+"""
+
+
+@compiled
+def begin_trial(
+    draft: NDArray[Any], offsets: NDArray[np.int64], bin_: int, occurrence: int
+) -> None:
+    """Make `draft` one of which nothing is drawn yet, from bin `bin_` and that occurrence on."""
+    d = draft[0]
+    d.first_bin, d.bin_ = bin_, bin_
+    d.first, d.end, d.occurrence = occurrence, occurrence, occurrence
+    d.class_, d.count, d.position = -1, -1, -1
+    d.label, d.noise_done, d.n_events = 0, 0, offsets[bin_]
+
+
+@compiled
+def fill_trial(
+    rng: Generator,
+    world: World,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    draft: NDArray[Any],
+) -> bool:
+    """Draw what `draft` still lacks. Onsets count from the trial's own first bin.
+
+    Returns False where a buffer is too short: to be continued with `longer_buffers`. One function,
+    and no buffer changes hands in it: numba counts references to arrays per call, for each array at
+    the cost of several spikes.
+    """
+    d = draft[0]
+    end, fits, placed = d.end, True, False
+    while fits and not placed:
+        if d.count < 0:
+            d.class_ += 1
+            placed = d.class_ >= world.n_classes
+            if not placed:
+                d.count = rng.poisson(world.mean_occurrences)
+                d.label += d.count * world.targets[d.class_]
+        else:
+            fits = end + d.count <= min(onsets.size, classes.size)
+            if fits:
+                # Where (background bin) and which (class), in one number: its order is the order in
+                # the trial. The numbers wait in `onsets` until the trial is laid out.
+                for k in range(end, end + d.count):
+                    where = int(rng.random() * world.background_bins)
+                    onsets[k] = where * world.n_classes + d.class_
+                end += d.count
+                d.count = -1
+                if d.class_ == world.n_classes - 1:
+                    _sort(onsets, d.first, end)
+
+    n_bins = world.background_bins + (end - d.first) * world.pattern_bins
+    fits = fits and d.first_bin + n_bins < offsets.size
+    k, noise_done, position, t, n_events = (
+        d.occurrence, d.noise_done, d.position, d.bin_, d.n_events
+    )  # fmt: skip
+    done = False
+    while fits and not done:
+        before = onsets[k] // world.n_classes if k < end else world.background_bins
+        if before > noise_done:
+            position, n_events, fits = _fill_noise(
+                rng, world, before - noise_done, channels, offsets, t, position, n_events
+            )
+            if fits:
+                t += before - noise_done
+                noise_done = before
+                position = -1
+        elif k == end:
+            done = True
+        else:
+            class_ = onsets[k] - before * world.n_classes
+            fits = n_events + _pattern_spikes(world, class_) <= channels.size
+            if fits:
+                onsets[k] = t - d.first_bin
+                classes[k] = class_
+                if _is_noisy(world):
+                    _fill_noisy_pattern(rng, world, class_, channels, offsets, t)
+                else:
+                    _fill_pattern(world, class_, channels, offsets, t)
+                t += world.pattern_bins
+                n_events = offsets[t]
+                k += 1
+    d.end, d.occurrence = end, k
+    d.noise_done, d.position, d.bin_, d.n_events = noise_done, position, t, n_events
+    return done
+
+
+@compiled
+def longer_buffers(
+    world: World,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    draft: NDArray[Any],
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The four buffers, with what they hold, long enough for `fill_trial` to get further."""
+    d = draft[0]
+    n_bins = world.background_bins + (d.end - d.first) * world.pattern_bins
+    return (
+        # A spike of noise, or any one pattern: no pattern has more spikes than all have together.
+        grown(channels, d.n_events + world.pattern_channels.size + 1),
+        grown(offsets, d.first_bin + n_bins + 1),
+        grown(onsets, d.end + max(d.count, 0)),
+        grown(classes, d.end + max(d.count, 0)),
+    )
+
+
 @compiled
 def append_trial(
     rng: Generator,
@@ -224,94 +353,17 @@ def append_trial(
 ]:
     """Append one trial, its first bin being bin `bin_`, its first occurrence number `occurrence`.
 
-    Onsets count from the trial's own first bin. Returns the four buffers, the bin and the number
-    of the occurrence that follow the trial's last, and the aggregate label.
+    `fill_trial` for those who do not count nanoseconds. Returns the four buffers, the bin and the
+    number of the occurrence that follow the trial's last, and the aggregate label.
     """
-    # Where (background bin) and which (class), in one number: its order is the order in the trial.
-    # The numbers wait in `onsets` until the trial is laid out.
-    end = occurrence
-    label = 0
-    for class_ in range(world.n_classes):
-        count = rng.poisson(world.mean_occurrences)
-        label += count * world.targets[class_]
-        if end + count > onsets.size:
-            onsets = grown(onsets, end + count)
-            classes = grown(classes, onsets.size)
-        for k in range(end, end + count):
-            onsets[k] = int(rng.random() * world.background_bins) * world.n_classes + class_
-        end += count
-    _sort(onsets, occurrence, end)
-
-    n_bins = world.background_bins + (end - occurrence) * world.pattern_bins
-    if bin_ + n_bins >= offsets.size:
-        offsets = grown(offsets, bin_ + n_bins + 1)
-    k, noise_done, position, t, n_events, missing = _fill_trial(
-        rng, world, channels, offsets, onsets, classes, bin_, end,
-        occurrence, 0, -1, bin_, offsets[bin_],
-    )  # fmt: skip
-    while missing > 0:
-        channels = grown(channels, channels.size + missing)
-        k, noise_done, position, t, n_events, missing = _fill_trial(
-            rng, world, channels, offsets, onsets, classes, bin_, end,
-            k, noise_done, position, t, n_events,
-        )  # fmt: skip
-    return channels, offsets, onsets, classes, t, end, label
-
-
-@compiled
-def _fill_trial(
-    rng: Generator,
-    world: World,
-    channels: NDArray[np.int32],
-    offsets: NDArray[np.int64],
-    onsets: NDArray[np.int64],
-    classes: NDArray[np.int64],
-    bin_: int,
-    end: int,
-    k: int,
-    noise_done: int,
-    position: int,
-    t: int,
-    n_events: int,
-) -> tuple[int, int, int, int, int, int]:
-    """Lay out a trial from bin `t` and occurrence `k` on, until its end or that of `channels`.
-
-    Takes and returns how far it has got, so that it can go on in a longer buffer: the occurrence,
-    the noise bins done, the last 1 in the present noise (−1: none yet), the bin and the number of
-    spikes; and the number of spikes for which there was no room (0: all is done). No buffer changes
-    hands here, which numba would count each time at the cost of several spikes.
-    """
-    missing = -1
-    while missing < 0:
-        before = onsets[k] // world.n_classes if k < end else world.background_bins
-        if before > noise_done:
-            position, n_events, done = _fill_noise(
-                rng, world, before - noise_done, channels, offsets, t, position, n_events
-            )
-            if done:
-                t += before - noise_done
-                noise_done = before
-                position = -1
-            else:
-                missing = 1
-        elif k == end:
-            missing = 0
-        else:
-            class_ = onsets[k] - before * world.n_classes
-            n_spikes = _pattern_spikes(world, class_)
-            if n_events + n_spikes > channels.size:
-                missing = n_spikes
-            else:
-                onsets[k] = t - bin_
-                classes[k] = class_
-                if _is_noisy(world):
-                    _fill_noisy_pattern(rng, world, class_, channels, offsets, t)
-                else:
-                    _fill_pattern(world, class_, channels, offsets, t)
-                t += world.pattern_bins
-                n_events = offsets[t]
-                k += 1
-    return k, noise_done, position, t, n_events, missing
+    draft = np.zeros(1, DRAFT)
+    begin_trial(draft, offsets, bin_, occurrence)
+    while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
+        channels, offsets, onsets, classes = longer_buffers(
+            world, channels, offsets, onsets, classes, draft
+        )
+    d = draft[0]
+    return channels, offsets, onsets, classes, d.bin_, d.occurrence, d.label
 
 
 @compiled

@@ -408,18 +408,15 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         labels, outputs = self._labels, self._outputs
         self._clean_results()
         pattern_bins = np.zeros(self.num_envs, np.int64)
+        onsets, classes, targets = self._lists.rows(self._over[: self._n_over].tolist())
         numbers = self._report[:length].tolist()
-        places, at = [], 0
-        while at < length:
-            places.append(at)
-            at += 2 + 3 * numbers[at + 1]
-        onsets, classes, targets = self._lists.rows([numbers[at] for at in places])
-        for at in places:
-            i, k = numbers[at], numbers[at + 1]
-            first, second, third = at + 2, at + 2 + k, at + 2 + 2 * k
+        end = 0
+        while end < length:
+            i, k, first = numbers[end], numbers[end + 1], end + 2
+            second, third, end = first + k, first + 2 * k, first + 3 * k
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
-            targets[i] = numbers[third : third + k]
+            targets[i] = numbers[third:end]
             pattern_bins[i] = self.task.pattern_bins
         mask = _read_only(terminated)
         return {

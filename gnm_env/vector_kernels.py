@@ -24,7 +24,7 @@ from numba.experimental import structref
 from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled
-from gnm_env.sampling import append_piece, append_trial
+from gnm_env.sampling import DRAFT, append_piece, begin_trial, fill_trial, longer_buffers
 from gnm_env.scoring import compiled_mistake_in_pattern, compiled_reward_for
 from gnm_env.task import World
 
@@ -259,15 +259,19 @@ def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
     channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
     offsets[0] = 0
     onsets, classes = np.empty(64, np.int64), np.empty(64, np.int64)
+    draft = np.zeros(1, DRAFT)
     held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
     events, parts, observations, shown = crowd.events, crowd.parts, crowd.observations, crowd.shown
     bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
     shift, n_shown = crowd.shift, crowd.n_shown
     for i in which:
-        s = state[i]
-        channels, offsets, onsets, classes, n_bins, s.n_occurrences, s.label = append_trial(
-            held[i], world, channels, offsets, onsets, classes, 0, 0
-        )
+        begin_trial(draft, offsets, 0, 0)
+        while not fill_trial(held[i], world, channels, offsets, onsets, classes, draft):
+            channels, offsets, onsets, classes = longer_buffers(
+                world, channels, offsets, onsets, classes, draft
+            )
+        s, n_bins = state[i], draft[0].bin_
+        s.n_occurrences, s.label = draft[0].occurrence, draft[0].label
         if offsets[n_bins] >= events.shape[1]:
             events = _widened(events, offsets[n_bins] + 1)
         if s.n_occurrences > parts.shape[1]:

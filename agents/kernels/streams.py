@@ -21,7 +21,14 @@ from agents.kernels.slots import (
 )
 from agents.kernels.trial import Block, Heard, Log, drive_at
 from agents.lanes import any_lane, full, load, pack, repeated, store, unpack, where
-from gnm_env.sampling import append_piece, append_trial
+from gnm_env.sampling import (
+    DRAFT,
+    append_piece,
+    append_trial,
+    begin_trial,
+    fill_trial,
+    longer_buffers,
+)
 from gnm_env.task import World
 
 BATCH_BINS = 4_096
@@ -59,6 +66,7 @@ def train_template(
     sound = np.empty((1, WIDTH))
     channels, offsets = np.empty(4096, np.int32), np.zeros(8192, np.int64)
     onsets, classes = np.empty(256, np.int64), np.empty(256, np.int64)
+    draft = np.zeros(1, DRAFT)
     bin_of = np.zeros(BATCH_BINS + 2, np.int64)  # first bin and first occurrence of each trial
     occurrence_of = np.zeros(BATCH_BINS + 2, np.int64)
     V = np.empty((0, WIDTH))
@@ -69,12 +77,14 @@ def train_template(
         drawn = 0
         longest = 0
         while done + drawn < trials and bin_of[drawn] < BATCH_BINS:
-            channels, offsets, onsets, classes, stop, occurrence_of[drawn + 1], _ = append_trial(
-                rng, world, channels, offsets, onsets, classes, bin_of[drawn], occurrence_of[drawn]
-            )
-            longest = max(longest, stop - bin_of[drawn])
-            bin_of[drawn + 1] = stop
+            begin_trial(draft, offsets, bin_of[drawn], occurrence_of[drawn])
+            while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
+                channels, offsets, onsets, classes = longer_buffers(
+                    world, channels, offsets, onsets, classes, draft
+                )
             drawn += 1
+            bin_of[drawn], occurrence_of[drawn] = draft[0].bin_, draft[0].occurrence
+            longest = max(longest, bin_of[drawn] - bin_of[drawn - 1])
         owed = world.targets[classes[: occurrence_of[drawn]]]
         if longest > len(V):
             V = np.empty((2 * longest, WIDTH))
@@ -84,6 +94,11 @@ def train_template(
         log = Log(V, above, counts)
         for block in range(n_blocks):
             p = unpack(Parameters, parameters[block], zero)
+            # Taken from the tables once: a view of an array costs as much as some bins.
+            its_weights, its_overflow = weights[block], overflow[block]
+            ended = load(its_overflow, 0, zero)
+            missed = load(wrong[block], 0, zero)
+            distance = load(absolute[block], 0, zero)
             for k in range(drawn):
                 heard = Heard(
                     channels,
@@ -92,16 +107,14 @@ def train_template(
                     owed[occurrence_of[k] : occurrence_of[k + 1]],
                     world.pattern_bins,
                 )
-                outcome, _ = run_trial(p, mode, weights[block], heard, log)
+                outcome, _ = run_trial(p, mode, its_weights, heard, log)
                 error = outcome.label - outcome.emitted
                 error = where(error < 0.0, zero - error, error)
-                missed = where(error > WRONG_BEYOND, 1.0, zero)
-                store(wrong[block], 0, load(wrong[block], 0, zero) + missed)
-                store(absolute[block], 0, load(absolute[block], 0, zero) + error)
-                ended = load(overflow[block], 0, zero)
+                missed = missed + where(error > WRONG_BEYOND, 1.0, zero)
+                distance = distance + error
                 c = where(ended < 0.0, correction(outcome), zero)
-                store(corrections, 0, c)
                 if any_lane(c != 0.0):
+                    store(corrections, 0, c)
                     learn_trial(
                         rule_parameters[block],
                         rule_mode,
@@ -109,14 +122,15 @@ def train_template(
                         heard,
                         log,
                         eligibility,
-                        weights[block],
+                        its_weights,
                         previous[block],
                         sound,
                     )
                     failed = (c != 0.0) & (load(sound, 0, zero) == 0.0)
-                    if any_lane(failed):
-                        trial = float(first_trial + done + k)
-                        store(overflow[block], 0, where(failed, trial, ended))
+                    ended = where(failed, float(first_trial + done + k), ended)
+            store(its_overflow, 0, ended)
+            store(wrong[block], 0, missed)
+            store(absolute[block], 0, distance)
         done += drawn
     return wrong, absolute
 

@@ -87,20 +87,25 @@ def run_trial_template(p: Any, mode: Any, weights: Block, heard: Heard, log: Log
     blame = zero
     owed = 0
     t = 0
-    for k in range(len(heard.onsets) + 1):
-        last = k == len(heard.onsets)
-        stop = len(heard.offsets) - 1 if last else heard.onsets[k]
+    k = 0
+    onsets, n_bins = heard.onsets, len(heard.offsets) - 1
+    # One way out of the loop: with a second one numba counts references to all arrays in here, for
+    # as long as twenty bins take.
+    last = False
+    while not last:
+        last = k == len(onsets)
+        stop = n_bins if last else onsets[k]
         state, spikes, bins_above = run_bins(p, mode, state, weights, heard, t, stop, log)
         in_noise = in_noise + spikes
         blame = blame + bins_above
-        if last:
-            break
-        t = stop + heard.pattern_bins
-        state, spikes, _ = run_bins(p, mode, state, weights, heard, stop, t, log)
-        in_patterns = in_patterns + spikes
-        blame = blame + where(spikes == heard.owed[k], zero, 1.0)
-        store(log.counts, k, spikes)
-        owed += heard.owed[k]
+        if not last:
+            t = stop + heard.pattern_bins
+            state, spikes, _ = run_bins(p, mode, state, weights, heard, stop, t, log)
+            in_patterns = in_patterns + spikes
+            blame = blame + where(spikes == heard.owed[k], zero, 1.0)
+            store(log.counts, k, spikes)
+            owed += heard.owed[k]
+            k += 1
     return Outcome(in_noise + in_patterns, full(float(owed), WIDTH), blame > 0.0), in_noise
 
 
