@@ -22,6 +22,13 @@ from gnm_env.task import Patterns, Task
 LANES_PER_UNIT = 32
 """Agents are handed to threads in multiples of this many, the width of the widest block."""
 
+SHARES, BLOCKS_PER_SHARE = 3, 8
+"""Units per thread, and blocks of lanes that each has at least.
+
+With several, a thread that the machine holds up leaves work to the others. Every unit draws the
+trials for itself, which eight blocks make cheap.
+"""
+
 BYTES_PER_WEIGHT, BYTES_PER_AGENT = 56, 14_000
 """Peak memory of training, the agents included; a benchmark checks it.
 
@@ -144,9 +151,11 @@ def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: 
 
 
 def _parts(places: list[int], threads: int) -> list[list[int]]:
-    """At most `threads` runs of nearly equal length, whole blocks of lanes each."""
+    """Runs of nearly equal length, whole blocks of lanes each, equally many for every thread."""
     blocks = -(-len(places) // LANES_PER_UNIT)
-    cuts = np.linspace(0, blocks, min(threads, blocks) + 1).round().astype(int) * LANES_PER_UNIT
+    shares = max(1, min(SHARES, blocks // (threads * BLOCKS_PER_SHARE))) if threads > 1 else 1
+    parts = min(threads * shares, blocks)
+    cuts = np.linspace(0, blocks, parts + 1).round().astype(int) * LANES_PER_UNIT
     return [places[a:b] for a, b in itertools.pairwise(cuts)]
 
 

@@ -69,6 +69,26 @@ def test_agents_that_would_not_fit_into_memory_are_refused_before_anything_is_al
         lane_groups(agents, task, None, 1)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("n_agents", [1, 63, 64, 400, 1_100])
+def test_threads_get_equally_many_units_and_every_agent_is_in_one(n_agents: int) -> None:
+    agents = [busy_agent(seed) for seed in range(n_agents)]
+    for threads in (1, 2, 3):
+        units = lane_groups(agents, BUSY, BUSY_PATTERNS, threads)
+        places = [place for _, part in units for place in part]
+        assert places == list(range(n_agents))
+        assert len(units) < threads or len(units) % threads == 0
+
+
+def test_more_units_than_threads_change_no_bits() -> None:
+    agents = [busy_agent(seed) for seed in range(1_100)]
+    assert len(lane_groups(agents, BUSY, BUSY_PATTERNS, threads=2)) > 2
+    history = train_many(agents, BUSY, BUSY_PATTERNS, 40, seed=0, threads=2, block=20)
+    together = [busy_agent(seed) for seed in range(1_100)]
+    expected = train_many(together, BUSY, BUSY_PATTERNS, 40, seed=0, threads=1)
+    assert np.array_equal([a.weights for a in agents], [a.weights for a in together])
+    assert np.allclose(history.error_rate.mean(axis=0), expected.error_rate[0])
+
+
 @pytest.mark.parametrize("run", ["loop", "lanes"])
 def test_weights_that_are_not_finite_are_refused_before_they_spread(run: str) -> None:
     agent = busy_agent()
