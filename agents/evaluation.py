@@ -53,8 +53,9 @@ def noisy_performance(
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     bins = np.empty((len(agents), runs), np.int64)
     threads = thread_count(threads)
-    units = lane_groups(agents, task, patterns, threads)
-    if not shared:
+    if shared or not agents:
+        units = lane_groups(agents, task, patterns, threads)
+    else:
         units = [
             (group, [b])
             for b in range(len(agents))
@@ -117,8 +118,8 @@ def mistake_rate(survived: ArrayLike, cap: int = MAX_EPISODE_BINS) -> MistakeRat
 
     bins = np.asarray(survived)
     mistakes = int(np.sum(bins < cap))
-    # A neuron that errs in the very first bin of every run has survived none: count that bin.
-    exposure = max(int(bins.sum()), 1) / 10_000
+    # Who errs in the very first bin of every run has survived none: count those bins.
+    exposure = max(int(bins.sum()), mistakes, 1) / 10_000
     low = chi2.ppf(0.025, 2 * mistakes) / 2 if mistakes else 0.0
     high = chi2.ppf(0.975, 2 * mistakes + 2) / 2
     return MistakeRate(mistakes / exposure, float(low) / exposure, float(high) / exposure)
@@ -130,9 +131,11 @@ def bootstrap_interval(
     """95 % percentile bootstrap interval of the mean of `values`, (n,)."""
     sample = np.asarray(values, np.float64)
     rng = np.random.default_rng(seed)
+    # In ten parts, which take a tenth of the memory.
+    parts = np.array_split(np.empty(whole("resamples", resamples, low=1)), 10)
     chunks = [
-        sample[rng.integers(0, len(sample), (n, len(sample)))].mean(axis=1)
-        for n in (resamples // 10,) * 10
+        sample[rng.integers(0, len(sample), (len(part), len(sample)))].mean(axis=1)
+        for part in parts
     ]
     low, high = np.percentile(np.concatenate(chunks), (2.5, 97.5))
     return float(low), float(high)

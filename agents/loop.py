@@ -29,7 +29,9 @@ def train(
     """Train `agent` on `trials` episodes of `env`, a PatternTrial environment, wrapped or not.
 
     Args:
-        agent: offers begin_trial(), act(obs) and learn(reward, info, sign_only).
+        agent: offers begin_trial(), act(obs) and learn(reward, info, sign_only). If it has an
+            attribute `overflowed`, training ends once that is True; answers within its
+            `wrong_beyond` of the label, if it has one, count as right.
         env: gives the aggregate label in its terminal info, or its sign as reward.
         trials: number of episodes.
         seed: of the stream. A Generator goes on from where it stands (and is moved on); None goes
@@ -48,6 +50,10 @@ def train(
     if isinstance(seed, Generator):
         env.unwrapped.np_random = seed
         seed = None
+    # Amounts are never exactly right: an agent that gives them says what counts as wrong.
+    wrong_beyond = max(
+        getattr(env.unwrapped, "tolerance", 0.0), getattr(agent, "wrong_beyond", 0.0)
+    )
     history = History()
     for start in range(0, trials, block):
         size = min(block, trials - start)
@@ -68,16 +74,14 @@ def train(
                 )
             agent.learn(float(reward), info, sign_only)
             error = abs(info["label"] - info["emitted"])
-            # Amounts are never exactly right: an agent that gives them says what counts as wrong.
-            tolerance = getattr(env.unwrapped, "tolerance", 0.0)
-            wrong += error > max(tolerance, getattr(agent, "wrong_beyond", 0.0))
+            wrong += error > wrong_beyond
             absolute += error
-            if agent.overflowed and history.overflowed < 0:
+            if getattr(agent, "overflowed", False) and history.overflowed < 0:
                 history.overflowed = np.array(trial)
         history.append(size, wrong, absolute)
         if callback is not None and callback(start + size, history) is False:
             break
-        if agent.overflowed:
+        if history.overflowed >= 0:
             break
     if history.overflowed >= 0:
         warn_of_overflow("the agent", int(history.overflowed) + 1)
@@ -85,6 +89,7 @@ def train(
 
 
 def warn_of_overflow(who: str, trials: int) -> None:
+    """Warn, with a remedy, that learning has ended; as if from where training was called."""
     warnings.warn(
         f"a weight of {who} would have overflowed within {trials:,} trials: learning ended and the "
         "last finite weights are kept; lower learning_rate or set weight_bounds",

@@ -16,25 +16,16 @@ from numpy.random import Generator
 from agents.history import BLOCK, Callback, History
 from agents.lane_group import LaneGroup
 from agents.loop import warn_of_overflow
+from agents.memory import require
+from agents.neuron_lanes import LANES_PER_BLOCK
 from gnm_env.checks import whole
 from gnm_env.task import Patterns, Task
 
-LANES_PER_UNIT = 32
-"""Agents are handed to threads in multiples of this many, the width of the widest block."""
-
 SHARES, BLOCKS_PER_SHARE = 3, 8
-"""Units per thread, and blocks of lanes that each has at least.
+"""Units per thread at most, and blocks of lanes from which on a thread gets more than one.
 
 With several, a thread that the machine holds up leaves work to the others. Every unit draws the
 trials for itself, which eight blocks make cheap.
-"""
-
-BYTES_PER_WEIGHT, BYTES_PER_AGENT = 56, 14_000
-"""Peak memory of training, the agents included; a benchmark checks it.
-
-Per weight: it and its last change, in the agent and side by side (32), the agent's room for the
-input spikes of a trial (16), copies while they change hands (8). Per agent: its Python objects and
-its room for the bins of a trial.
 """
 
 
@@ -49,31 +40,41 @@ def train_many(
     callback: Callback | None = None,
     block: int = BLOCK,
 ) -> History:
-    """Train agents on the same `trials` trials, each drawn once for all of them.
+    """Train agents on the same `trials` trials.
+
+    Each trial is drawn once for all agents of a kind that share a thread, from the same generator.
 
     Each agent ends with the bits that `train` gives it alone on the same seed, whatever the number
     of agents and of threads.
 
     Args:
-        agents: of any kinds; those alike are trained side by side.
+        agents: of any kinds that learn; those alike are trained side by side.
         task, patterns: what they hear.
         trials: number of trials.
-        seed: of the stream. A Generator goes on from where it stands, and is moved on.
+        seed: of the stream. A Generator goes on from where it stands, and is moved on; None: a
+            stream that nobody has heard before.
         threads: number of threads; None: one per core.
         callback: called after each block with the trials done and the history; False ends training.
-            The agents are up to date when it is called.
+            The agents are up to date when it is called; what it changes in them is lost.
         block: trials per entry of the history.
 
     Returns:
         The learning curves, with one column per agent, in the order of `agents`.
 
     Raises:
-        ValueError: if there are no agents, if they do not fit the task, or if memory is short.
+        ValueError: if there are no agents, if one cannot learn or does not fit the task, or if
+            memory is short.
     """
     trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
     rng = seed if isinstance(seed, Generator) else np.random.default_rng(seed)
     threads = thread_count(threads)
     units = lane_groups(agents, task, patterns, threads)
+    for group, places in units:
+        if not hasattr(group, "train"):
+            raise ValueError(
+                f"agents must be able to learn, but agent {places[0]} is a "
+                f"{type(agents[places[0]]).__name__}, which can only be scored"
+            )
     history = History(
         error_rate=np.empty((0, len(agents))),
         mean_error=np.empty((0, len(agents))),
@@ -138,7 +139,13 @@ def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: 
     """Agents grouped by kind and cut into units for the threads, each with its agents' places."""
     if not isinstance(agents, Sequence) or len(agents) == 0:
         raise ValueError(f"agents must be a list of at least one agent, got {agents!r}")
-    _require_memory(agents, task)
+    for place, agent in enumerate(agents):
+        if not hasattr(agent, "group_key"):
+            raise ValueError(
+                f"agents must be agents, such as NeuronAgent makes, got {agent!r} as agent {place}"
+            )
+    n_weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
+    require(n_weights, len(agents), task, threads)
     kinds: dict[Hashable, list[int]] = defaultdict(list)
     for place, agent in enumerate(agents):
         kinds[agent.group_key()].append(place)
@@ -151,22 +158,9 @@ def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: 
 
 
 def _parts(places: list[int], threads: int) -> list[list[int]]:
-    """Runs of nearly equal length, whole blocks of lanes each, equally many for every thread."""
-    blocks = -(-len(places) // LANES_PER_UNIT)
+    """Runs of nearly equal length, cut between blocks of lanes: as many for each thread."""
+    blocks = -(-len(places) // LANES_PER_BLOCK)
     shares = max(1, min(SHARES, blocks // (threads * BLOCKS_PER_SHARE))) if threads > 1 else 1
     parts = min(threads * shares, blocks)
-    cuts = np.linspace(0, blocks, parts + 1).round().astype(int) * LANES_PER_UNIT
+    cuts = np.linspace(0, blocks, parts + 1).round().astype(int) * LANES_PER_BLOCK
     return [places[a:b] for a, b in itertools.pairwise(cuts)]
-
-
-def _require_memory(agents: Sequence[Any], task: Task) -> None:
-    """ValueError if the agents with all that their training needs exceed this machine's memory."""
-    weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
-    needed = BYTES_PER_WEIGHT * weights + BYTES_PER_AGENT * len(agents)
-    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > there:
-        raise ValueError(
-            f"training {len(agents):,} agents of {task.n_inputs:,} inputs side by side needs "
-            f"{needed / 2**30:,.1f} GiB, this machine has {there / 2**30:,.1f}: "
-            "train fewer agents at a time"
-        )

@@ -16,13 +16,16 @@ from gnm_env.task import Patterns, Task, world
 if TYPE_CHECKING:
     from agents.neuron_agent import NeuronAgent
 
-WIDTHS = (1, 8, 32)
-"""Neurons per block. The wider, the better latencies are hidden; unused lanes cost as used ones."""
+LANES_PER_BLOCK = 32
+"""Width of a block of many neurons."""
 
 
 def width_for(lanes: int) -> int:
-    """The block width that serves this number of neurons fastest."""
-    return 1 if lanes <= 2 else 8 if lanes <= 8 else 32
+    """The block width that serves this number of neurons fastest.
+
+    The wider, the better latencies are hidden; unused lanes cost as much as used ones.
+    """
+    return 1 if lanes <= 2 else 8 if lanes <= 8 else LANES_PER_BLOCK
 
 
 class NeuronLanes:

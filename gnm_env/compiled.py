@@ -62,11 +62,14 @@ class _Cache(FunctionCache):
 def _digest(function: Any) -> str:
     """A digest of the sources and constants that the compiled `function` rests on.
 
-    Taken at the first call, when every name that the function uses has got its value.
+    Taken at the first call, when every name that the function uses has got its value. Compiled
+    functions are followed wherever they lie; of what is not compiled, the source counts where it
+    belongs to this package or to that of any function followed (NumPy's and Python's do not).
     """
-    packages = {"gnm_env", function.__module__.partition(".")[0]}
+    packages = {"gnm_env"}
     files: set[str] = set()
     constants: list[str] = []
+    others: list[Any] = []
     seen: set[int] = set()
     waiting = [function]
     while waiting:
@@ -74,18 +77,33 @@ def _digest(function: Any) -> str:
         if id(current) in seen:
             continue
         seen.add(id(current))
-        files.add(current.__code__.co_filename)
+        packages.add(current.__module__.partition(".")[0])
+        if Path(current.__code__.co_filename).is_file():
+            files.add(current.__code__.co_filename)
+        else:  # typed in, in a notebook say
+            constants.append(f"{current.__code__.co_code.hex()} {current.__code__.co_consts!r}")
         for name in sorted(set(_names(current.__code__)) & current.__globals__.keys()):
             value = current.__globals__[name]
             if isinstance(value, Dispatcher):
-                value = value.py_func
-            module = getattr(value, "__module__", None) or ""
-            if module.partition(".")[0] in packages:
-                files.add(str(sys.modules[module].__file__))
-                if isinstance(value, types.FunctionType):
-                    waiting.append(value)
+                waiting.append(value.py_func)
             elif isinstance(value, (bool, int, float, str)):
                 constants.append(f"{current.__qualname__}.{name}={value!r}")
+            else:
+                others.append(value)
+        if not waiting:
+            # Only now is it known which packages have a part in it.
+            left = []
+            for value in others:
+                module = str(getattr(value, "__module__", None) or "")
+                if module.partition(".")[0] not in packages:
+                    left.append(value)
+                    continue
+                source = getattr(sys.modules[module], "__file__", None)
+                if source is not None:
+                    files.add(source)
+                if isinstance(value, types.FunctionType):
+                    waiting.append(value)
+            others = left
     digest = hashlib.sha1("\n".join(sorted(constants)).encode())
     for file in sorted(files):
         digest.update(Path(file).read_bytes())

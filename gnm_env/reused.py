@@ -1,4 +1,7 @@
-"""Arrays of Python objects that are used again once nobody else holds them."""
+"""Arrays of Python objects that are used again once nobody else holds them.
+
+Rests on CPython, which counts references and tells the count: `sys.getrefcount`.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ from numpy.typing import NDArray
 
 
 class ReusedRows:
-    """Rows of objects, None but where somebody writes, lent anew at every call of `rows`.
+    """Rows of objects, None but where their owner writes, lent read-only and used again.
 
     To make and to free object arrays of a thousand entries takes as long as a sixth of a step of a
-    thousand environments. So the last ones are lent again if nobody has kept any of them, not even
+    thousand environments. So the last ones are used again if nobody has kept any of them, not even
     a part; whoever keeps one has it for good.
 
     Args:
@@ -23,19 +26,22 @@ class ReusedRows:
 
     def __init__(self, n_rows: int, length: int) -> None:
         self._n_rows, self._length = n_rows, length
-        self._written: Sequence[int] = ()
         self._renew()
         self._unlent = self._references()
 
     def _renew(self) -> None:
         self._rows = [np.empty(self._length, object) for _ in range(self._n_rows)]
+        self._views = [row[:] for row in self._rows]
+        for view in self._views:
+            view.setflags(write=False)
+        self._written: Sequence[int] = ()
 
     def _references(self) -> int:
-        """References to the row that has most; who is lent a row, or a part of one, has another."""
-        return max(map(sys.getrefcount, self._rows))
+        """References to all these arrays; whoever keeps one, or a part of one, adds to them."""
+        return sum(map(sys.getrefcount, self._rows)) + sum(map(sys.getrefcount, self._views))
 
     def rows(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """The rows, each of them None everywhere; the caller will write to `places` only."""
+        """The rows, each of them None everywhere, for their owner to write to `places` only."""
         if self._references() > self._unlent:
             self._renew()
         else:
@@ -43,4 +49,8 @@ class ReusedRows:
                 for place in self._written:
                     row[place] = None
         self._written = places
-        return self._rows.copy()
+        return self._rows
+
+    def lent(self) -> list[NDArray[Any]]:
+        """The same rows for others, who can keep them but not write to them."""
+        return self._views.copy()

@@ -7,9 +7,9 @@ they are given and return them, since a buffer that is too short is replaced by 
 The order of the draws is part of the interface: the environments and the compiled training loops
 share these functions, and so hear the same stream from the same generator.
 
-Indices in the inner loops are unsigned, since numba lets signed ones count from the end and pays
-for looking; together with a single exit per function (else numba counts references to the arrays)
-this is a third of the time.
+In the loops that every spike goes through indices are unsigned, since numba lets signed ones count
+from the end and pays for looking; together with a single exit per function (else numba counts
+references to the arrays) this is a third of the time.
 """
 
 from __future__ import annotations
@@ -213,8 +213,8 @@ DRAFT = np.dtype(
     [
         ("first_bin", np.int64),
         ("first", np.int64),  # the trial's first occurrence
-        ("class_", np.int64),  # whose occurrences were drawn last, and how many of them are still
-        ("count", np.int64),  # to be placed (−1: none, the next class can be drawn)
+        ("class_", np.int64),  # the class whose occurrences are being drawn
+        ("count", np.int64),  # its occurrences still to be placed (−1: it has yet to be drawn)
         ("label", np.int64),
         ("end", np.int64),  # the occurrence after the trial's last so far
         ("occurrence", np.int64),  # the next to be laid out
@@ -224,7 +224,7 @@ DRAFT = np.dtype(
         ("n_events", np.int64),  # spikes so far
     ]
 )
-"""How far a trial has been drawn, so that drawing can go on in longer buffers; shape (1,).
+"""How far a trial has been drawn, so that drawing can go on in longer buffers. In arrays (1,).
 
 Once all is drawn, `bin_` and `occurrence` are those that follow the trial's last, and `label` is
 its aggregate label.
@@ -239,8 +239,8 @@ def begin_trial(
     d = draft[0]
     d.first_bin, d.bin_ = bin_, bin_
     d.first, d.end, d.occurrence = occurrence, occurrence, occurrence
-    d.class_, d.count, d.position = -1, -1, -1
-    d.label, d.noise_done, d.n_events = 0, 0, offsets[bin_]
+    d.count, d.position = -1, -1
+    d.class_, d.label, d.noise_done, d.n_events = 0, 0, 0, offsets[bin_]
 
 
 @compiled
@@ -255,31 +255,28 @@ def fill_trial(
 ) -> bool:
     """Draw what `draft` still lacks. Onsets count from the trial's own first bin.
 
-    Returns False where a buffer is too short: to be continued with `longer_buffers`. One function,
-    and no buffer changes hands in it: numba counts references to arrays per call, for each array at
-    the cost of several spikes.
+    Returns False where a buffer is too short: to be continued with `longer_buffers`. One function
+    for both halves, and no buffer changes hands in it: each further call that is given the buffers
+    costs as much as twenty spikes, since numba counts references to each of them.
     """
     d = draft[0]
-    end, fits, placed = d.end, True, False
-    while fits and not placed:
+    end, fits = d.end, True
+    while fits and d.class_ < world.n_classes:
         if d.count < 0:
+            d.count = rng.poisson(world.mean_occurrences)
+            d.label += d.count * world.targets[d.class_]
+        fits = end + d.count <= min(onsets.size, classes.size)
+        if fits:
+            # Where (background bin) and which (class), in one number: its order is the order in the
+            # trial. The numbers wait in `onsets` until the trial is laid out.
+            for k in range(end, end + d.count):
+                where = int(rng.random() * world.background_bins)
+                onsets[k] = where * world.n_classes + d.class_
+            end += d.count
+            d.count = -1
             d.class_ += 1
-            placed = d.class_ >= world.n_classes
-            if not placed:
-                d.count = rng.poisson(world.mean_occurrences)
-                d.label += d.count * world.targets[d.class_]
-        else:
-            fits = end + d.count <= min(onsets.size, classes.size)
-            if fits:
-                # Where (background bin) and which (class), in one number: its order is the order in
-                # the trial. The numbers wait in `onsets` until the trial is laid out.
-                for k in range(end, end + d.count):
-                    where = int(rng.random() * world.background_bins)
-                    onsets[k] = where * world.n_classes + d.class_
-                end += d.count
-                d.count = -1
-                if d.class_ == world.n_classes - 1:
-                    _sort(onsets, d.first, end)
+            if d.class_ == world.n_classes:
+                _sort(onsets, d.first, end)
 
     n_bins = world.background_bins + (end - d.first) * world.pattern_bins
     fits = fits and d.first_bin + n_bins < offsets.size

@@ -23,9 +23,12 @@ from gnm_env.task import Patterns, Task, world
 from gnm_env.trial_env import FEEDBACK, OUTPUT
 from gnm_env.vector_kernels import (
     COST,
+    DENSE,
     DISABLED,
     NEXT_STEP,
+    NO_LIMIT,
     SAME_STEP,
+    SIGN,
     STREAM_STATE,
     TRIAL_STATE,
     begin_streams,
@@ -37,7 +40,6 @@ from gnm_env.vector_kernels import (
     step_trials,
 )
 
-NO_LIMIT = 2**30
 NAMES = np.array([None, *MISTAKES[1:]], object)
 """Mistakes by number, as `info` names them."""
 AUTORESET = {
@@ -45,6 +47,8 @@ AUTORESET = {
     AutoresetMode.SAME_STEP: SAME_STEP,
     AutoresetMode.DISABLED: DISABLED,
 }
+
+FEEDBACK_NUMBER = {"cost": COST, "sign": SIGN, "dense": DENSE}
 
 Bits = NDArray[np.int8]
 Seeds = int | list[int | None] | None
@@ -103,7 +107,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self.copy = bool(copy)
         self._limit = NO_LIMIT
         if max_episode_steps is not None:
-            self._limit = min(NO_LIMIT, whole("max_episode_steps", max_episode_steps, low=1))
+            self._limit = whole("max_episode_steps", max_episode_steps, low=1, high=NO_LIMIT - 1)
         self.single_observation_space = spaces.Box(0, 1, (task.n_inputs,), np.int8)
         self.single_action_space = action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -189,14 +193,15 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         if seed is None:
             return
         seeds = self._seed_of_each(seed)
+        # All first: a seed that is refused then leaves everything as it was.
+        drawn = {i: seeding.np_random(seeds[i]) for i in which.tolist() if seeds[i] is not None}
         generators = self._seeded()
-        for i in which:
-            if seeds[i] is not None:
-                rng, self._seeds[i] = seeding.np_random(seeds[i])
-                generators.replace(i, rng)
-                self._reseeded(i)
+        for i, (rng, self._seeds[i]) in drawn.items():
+            generators.replace(i, rng)
+            self._reseeded(i)
 
     def _seed_of_each(self, seed: int | list[int | None]) -> list[int | None]:
+        """One seed per environment, None where its generator goes on."""
         try:
             first = operator.index(seed)  # type: ignore[arg-type]
         except TypeError:
@@ -226,10 +231,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         mask = self._mask(options)
         which = np.flatnonzero(mask)
         self._seed(seed, which)
-        # Before `clear_rows`, which moves those still over to the front.
-        self._n_over = int(np.count_nonzero(~mask[self._over[: self._n_over]]))
         if self._crowd is not None:
-            clear_rows(self._crowd, mask)
+            self._n_over = clear_rows(self._crowd, mask)
         self._begin(which)
         return self._seen(), {}
 
@@ -264,6 +267,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             )
 
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
+        """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
         checked = np.asarray(actions)
         if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
             raise ValueError(
@@ -360,7 +364,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
                 np.zeros(self.num_envs, TRIAL_STATE),
                 self._emitted,
                 self.max_output if self._graded else 1.0,
-                FEEDBACK.index(self.feedback),
+                FEEDBACK_NUMBER[self.feedback],
                 self.tolerance,
             )
         begin_trials(self._crowd, which)
@@ -388,6 +392,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         return self._seen(), rewards, terminated, truncated, info
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
+        """Actions as float64 (n,); whether each is in range the compiled step finds out."""
         checked = np.asarray(actions)
         if checked.shape != (self.num_envs, 1) or checked.dtype.kind not in "fiub":
             raise ValueError(
@@ -407,7 +412,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             return {}
         labels, outputs = self._labels, self._outputs
         self._clean_results()
-        pattern_bins = np.zeros(self.num_envs, np.int64)
+        n_pattern, pattern_bins = self.task.pattern_bins, np.zeros(self.num_envs, np.int64)
         onsets, classes, targets = self._lists.rows(self._over[: self._n_over].tolist())
         numbers = self._report[:length].tolist()
         end = 0
@@ -417,7 +422,8 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
             targets[i] = numbers[third:end]
-            pattern_bins[i] = self.task.pattern_bins
+            pattern_bins[i] = n_pattern
+        onsets, classes, targets = self._lists.lent()
         mask = _read_only(terminated)
         return {
             "label": labels,

@@ -30,6 +30,8 @@ from gnm_env.task import World
 
 NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2
 COST, SIGN, DENSE = 0, 1, 2
+NO_LIMIT = 2**30
+"""Stands for an episode of any length; bins are counted in 32 bits."""
 
 TRIAL_STATE = np.dtype(
     [
@@ -88,7 +90,8 @@ structref.define_constructor(
         "over",  # over[:n_over]: the environments that the last step ended
         "n_over",
         "finals",  # their last observations, under SAME_STEP
-        "looks",  # room for a number per environment, and one more
+        "looks",  # room for a number per environment, and again
+        "ended",
     ],
 )
 
@@ -113,11 +116,11 @@ def new_crowd(
     n = observations.shape[0]
     return Crowd(
         held, world, autoreset, limit, most, feedback, tolerance,
-        np.zeros((4, n), np.uint32), state, emitted,
+        np.zeros((4, n + 16), np.uint32), state, emitted,
         events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
         # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
-        observations, np.empty(2 * observations.size, np.uint64), 0,
-        over, 0, finals, np.empty(n + 1, np.uint32),
+        observations, np.empty(2 * observations.size + 1, np.uint64), 0,
+        over, 0, finals, np.empty(n, np.uint32), np.empty(n, np.uint32),
     )  # fmt: skip
 
 
@@ -166,36 +169,55 @@ def _store(
 
 
 @compiled
-def _look(
-    i: int,
-    bins: NDArray[np.uint32],
-    due: NDArray[np.uint32],
-    cursors: NDArray[np.uint32],
-    deadlines: NDArray[np.uint32],
-    events: NDArray[Any],
-    shift: int,
-    observations: NDArray[np.int8],
-    shown: NDArray[np.uint64],
-    n_shown: int,
-) -> tuple[int, bool]:
-    """Show the spikes of the bin in row `i`, which is clear, and note when to look again.
+def _show(crowd: Any, n: int) -> int:
+    """Show the spikes of the present bin in the rows `looks[:n]`, which are clear.
 
-    Returns the number of ones now shown, and whether what was drawn has come to its end.
+    Notes for each when to look again. Puts those that are at the end of what was drawn, or at their
+    deadline, into `ended`; returns their number. `looks` is used up.
+
+    All rows show one spike, then those that have another the next, and so on: how many spikes a bin
+    has is a coin toss, and a branch on it would cost more than all the rest.
     """
+    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
+    events, shift, looks, ended = crowd.events, crowd.shift, crowd.looks, crowd.ended
+    shown, n_shown, n_inputs = crowd.shown, crowd.n_shown, crowd.observations.shape[1]
     end = (1 << shift) - 1
-    bin_ = np.int64(bins[i]) << shift
-    cursor = cursors[i]
-    # Within the bin this is the channel; at the end of what was drawn `end`, in later bins more.
-    channel = events[i, cursor] - bin_
-    while channel < end:
-        observations[i, np.uint32(channel)] = 1
-        shown[np.uint32(n_shown)] = i * observations.shape[1] + channel
-        n_shown += 1
-        cursor = np.uint32(cursor + 1)
-        channel = events[i, cursor] - bin_
-    cursors[i] = cursor
-    due[i] = min((channel + bin_) >> shift, deadlines[i])
-    return n_shown, channel == end
+    n_ended = 0
+    while n > 0:
+        n_more = 0
+        for k in range(n):
+            i = looks[np.uint32(k)]
+            bin_ = np.int64(bins[i]) << shift
+            cursor, deadline = cursors[i], deadlines[i]
+            # Within the bin this is the channel; at the end of what was drawn `end`, in later bins
+            # more. Places that turn out to hold no spike are overwritten by the next.
+            channel = events[i, cursor] - bin_
+            shown[np.uint64(n_shown)] = np.int64(i) * n_inputs + channel
+            is_spike = channel < end
+            n_shown += is_spike
+            cursor = np.uint32(cursor + is_spike)
+            cursors[i] = cursor
+            channel = events[i, cursor] - bin_
+            due[i] = min((channel + bin_) >> shift, np.int64(deadline))
+            more = channel < end
+            looks[np.uint32(n_more)] = i
+            n_more += more
+            ended[np.uint32(n_ended)] = i
+            n_ended += (not more) & ((channel == end) | (bin_ >> shift == deadline))
+        n = n_more
+    places = crowd.observations.reshape(-1)
+    for k in range(crowd.n_shown, n_shown):
+        places[shown[np.uint64(k)]] = 1
+    crowd.n_shown = n_shown
+    return n_ended
+
+
+@compiled
+def _show_first(crowd: Any, which: NDArray[Any]) -> None:
+    """Show the spikes of the bin at which each environment in `which` begins."""
+    for k in range(which.size):
+        crowd.looks[k] = which[k]
+    _show(crowd, which.size)
 
 
 @compiled
@@ -208,8 +230,11 @@ def _clear(crowd: Any) -> None:
 
 
 @compiled
-def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> None:
-    """Clear the rows `which`, and forget that their environments are over."""
+def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> int:
+    """Clear the rows `which`, and forget that their environments are over.
+
+    Returns the number of environments that are still over.
+    """
     n_inputs = crowd.observations.shape[1]
     n_shown = 0
     for place in crowd.shown[: crowd.n_shown]:
@@ -226,6 +251,7 @@ def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> None:
             crowd.over[n_over] = i
             n_over += 1
     crowd.n_over = n_over
+    return n_over
 
 
 @compiled
@@ -261,9 +287,8 @@ def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
     onsets, classes = np.empty(64, np.int64), np.empty(64, np.int64)
     draft = np.zeros(1, DRAFT)
     held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
-    events, parts, observations, shown = crowd.events, crowd.parts, crowd.observations, crowd.shown
-    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
-    shift, n_shown = crowd.shift, crowd.n_shown
+    events, parts, shift = crowd.events, crowd.parts, crowd.shift
+    bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
     for i in which:
         begin_trial(draft, offsets, 0, 0)
         while not fill_trial(held[i], world, channels, offsets, onsets, classes, draft):
@@ -282,10 +307,8 @@ def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
         s.occurrence, s.given = 0, 0.0
         emitted[i] = 0
         bins[i], cursors[i], deadlines[i] = 0, 0, crowd.limit
-        n_shown, _ = _look(
-            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
-        )
-    crowd.events, crowd.parts, crowd.n_shown = events, parts, n_shown
+    crowd.events, crowd.parts = events, parts
+    _show_first(crowd, which)
 
 
 @compiled
@@ -313,7 +336,7 @@ def step_trials(
         return bad, crowd.n_over, 0, report
     _clear(crowd)
     clock, over, looks, emitted = crowd.clock, crowd.over, crowd.looks, crowd.emitted
-    bins, due, cursors, deadlines = clock[0], clock[1], clock[2], clock[3]
+    bins, due, deadlines = clock[0], clock[1], clock[3]
     if crowd.feedback == DENSE:
         for i in range(actions.size):
             rewards[i] = _dense_reward(
@@ -331,19 +354,13 @@ def step_trials(
     for i in range(actions.size):
         looks[n_looks] = i
         n_looks += bins[i] == due[i]
-    events, shift = crowd.events, crowd.shift
-    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
-    n_over = length = 0
-    for i in looks[:n_looks]:
-        n_shown, ended = _look(
-            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
-        )
-        if not ended and bins[i] < deadlines[i]:
-            continue
-        over[n_over] = i
-        n_over += 1
+    n_over = _show(crowd, n_looks)
+    length = 0
+    for k in range(n_over):
+        i = crowd.ended[k]
+        over[k] = i
         truncated[i] = bins[i] == deadlines[i]
-        if ended:
+        if _is_used_up(crowd, i):
             s = crowd.state[i]
             terminated[i] = True
             labels[i], outputs[i] = s.label, emitted[i]
@@ -354,13 +371,20 @@ def step_trials(
             report, length = _reported(
                 report, length, i, crowd.parts[i, : s.n_occurrences], crowd.world.targets
             )
-    crowd.n_shown, crowd.n_over = n_shown, n_over
+    crowd.n_over = n_over
 
     if crowd.autoreset == SAME_STEP:
         _set_aside(crowd)
         begin_trials(crowd, over[:n_over])
         crowd.n_over = 0
     return -1, n_over, length, report
+
+
+@compiled
+def _is_used_up(crowd: Any, i: int) -> bool:
+    """Whether what was drawn for environment `i`, whose present bin is shown, ends here."""
+    left = crowd.events[i, crowd.clock[2, i]]
+    return left >> crowd.shift == crowd.clock[0, i]
 
 
 @compiled
@@ -412,7 +436,7 @@ def _reported(
 
 
 @compiled
-def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
+def _go_on(crowd: Any, which: NDArray[Any], begin: bool) -> None:
     """Show the next bin of each stream in `which`, whose rows are clear.
 
     Where a piece is used up, that is the first of the next piece. With `begin` an episode begins in
@@ -422,10 +446,9 @@ def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
         return
     channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
     offsets[0] = 0
-    held, world, state, events = crowd.held, crowd.world, crowd.state, crowd.events
-    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
-    shift = crowd.shift
-    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
+    held, world, state = crowd.held, crowd.world, crowd.state
+    events, shift = crowd.events, crowd.shift
+    bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
     for i in which:
         s = state[i]
         if begin and not s.anew and bins[i] < s.n_noise and bins[i] + 1 < s.n_bins:
@@ -440,15 +463,14 @@ def _go_on(crowd: Any, which: NDArray[np.int64], begin: bool) -> None:
             if offsets[s.n_bins] >= events.shape[1]:
                 events = _widened(events, offsets[s.n_bins] + 1)
             _store(events[i], shift, s.n_bins, channels, offsets)
-            deadlines[i] -= bins[i]
+            if crowd.limit < NO_LIMIT:
+                deadlines[i] -= bins[i]
             bins[i], cursors[i] = 0, 0
         s.count = 0
         if begin:
             deadlines[i] = bins[i] + crowd.limit
-        n_shown, _ = _look(
-            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
-        )
-    crowd.events, crowd.n_shown = events, n_shown
+    crowd.events = events
+    _show_first(crowd, which)
 
 
 @compiled
@@ -477,13 +499,13 @@ def step_streams(
         return bad, crowd.n_over
     _clear(crowd)
     clock, over, looks = crowd.clock, crowd.over, crowd.looks
-    bins, due, cursors, deadlines = clock[0], clock[1], clock[2], clock[3]
+    bins, due, deadlines = clock[0], clock[1], clock[3]
     for i in range(actions.size):
         rewards[i] = 1.0
     if crowd.autoreset == NEXT_STEP:
         _go_on(crowd, over[: crowd.n_over], True)
         for i in over[: crowd.n_over]:
-            bins[i] -= 1
+            bins[i] -= 1  # below 0 it wraps around, and back by what follows
             rewards[i] = 0.0
     for i in range(actions.size):
         bins[i] += 1
@@ -491,14 +513,16 @@ def step_streams(
     n_looks = 0
     for i in range(actions.size):
         looks[n_looks] = i
+        n_looks += bins[i] == due[i]
+    _show(crowd, n_looks)
+    # Only those at an end are still due.
+    n_looks = 0
+    for i in range(actions.size):
+        looks[n_looks] = i
         n_looks += (bins[i] == due[i]) | ((actions[i] != 0) & (rewards[i] != 0.0))
-    events, shift = crowd.events, crowd.shift
-    observations, shown, n_shown = crowd.observations, crowd.shown, crowd.n_shown
     n_over = n_used_up = 0
     for i in looks[:n_looks]:
-        n_shown, used_up = _look(
-            np.uint32(i), bins, due, cursors, deadlines, events, shift, observations, shown, n_shown
-        )
+        used_up = _is_used_up(crowd, i)
         if used_up or actions[i] != 0:
             mistake, class_ = _mistake(crowd.state[i], bins[i], actions[i], crowd.world.targets)
             if mistake:
@@ -512,7 +536,7 @@ def step_streams(
         if used_up:
             looks[n_used_up] = i  # in the place of one that has been looked at
             n_used_up += 1
-    crowd.n_shown, crowd.n_over = n_shown, n_over
+    crowd.n_over = n_over
 
     _go_on(crowd, looks[:n_used_up], False)
     if crowd.autoreset == SAME_STEP:

@@ -172,6 +172,15 @@ def check(options: argparse.Namespace) -> None:
             raise ValueError(f"--{name} must be >= {low}, got {value}")
     if options.quick and options.full:
         raise ValueError("--quick and --full exclude each other: choose one")
+    if options.publish and not options.last:
+        partial = [f"--{name}" for name in ("quick", "only") if getattr(options, name)]
+        if options.repeats < DEFAULTS[0][1]:
+            partial.append("--repeats")
+        if partial:
+            raise ValueError(
+                f"--publish wants the long run, not one with {' and '.join(partial)}: "
+                "leave one of the two out"
+            )
 
 
 def last(folder: Path) -> Findings:

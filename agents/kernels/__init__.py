@@ -2,8 +2,8 @@
 
 The functions here are templates: `kernels(neuron, rule, width)` binds `step` and its types to a
 neuron, `correction`, `teaching_signal` and `weight_change` to a rule, and WIDTH to a number of
-neurons side by side. WIDTH 1 serves the standard loop, a bin at a time; larger ones whole trials
-for many neurons. They share every formula, and so end with the same bits.
+neurons side by side: 1 for the standard loop, a bin at a time; 1 or more for whole trials of one or
+of many neurons. They share every formula, and so end with the same bits.
 
 A *block* holds WIDTH neurons; its arrays have shape (rows, WIDTH): parameters (one row a field),
 weights and their previous changes (one row an input), state. Arrays of many blocks have shape

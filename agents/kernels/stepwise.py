@@ -83,7 +83,8 @@ def study_template(
 ) -> bool:
     """The learning step of the standard loop, from the agent's own record of the trial.
 
-    `sign` is the feedback where only its sign is known, NaN where label and occurrences are.
+    `sign` is that of label − emitted where nothing else is known; NaN where the label and the
+    occurrences are.
     Returns False if the step was called for but would have made a weight overflow.
     """
     if np.isnan(sign):
@@ -107,7 +108,7 @@ def study_template(
             blame += 1.0 if count != heard.owed[k] else 0.0
         c = correction(Outcome(float(emitted), float(label), blame > 0.0))
     else:
-        c = sign
+        c = correction(Outcome(0.0, sign, False))
     if c == 0.0:
         return True
     eligibility = np.empty((len(weights), WIDTH))

@@ -21,6 +21,7 @@ from agents.kernels.slots import (
 )
 from agents.kernels.trial import Block, Heard, Log, drive_at
 from agents.lanes import any_lane, full, load, pack, repeated, store, unpack, where
+from gnm_env.compiled import compiled
 from gnm_env.sampling import (
     DRAFT,
     append_piece,
@@ -32,10 +33,42 @@ from gnm_env.sampling import (
 from gnm_env.task import World
 
 BATCH_BINS = 4_096
-"""Trials are drawn ahead until this many bins are there (one trial at least)."""
+"""Trials are drawn ahead until this many bins are there (one trial at least): the parameters of a
+block are then read once for some twenty trials, and what was drawn stays in the cache."""
 
 MOST_SPIKES = 10
 """Responses are counted up to this many spikes per occurrence; the last count means "or more"."""
+
+
+@compiled
+def draw_trials(
+    rng: Generator,
+    world: World,
+    most: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    bin_of: NDArray[np.int64],
+    occurrence_of: NDArray[np.int64],
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int, int]:
+    """Draw at most `most` trials one behind the other, until there are BATCH_BINS bins.
+
+    Fills `bin_of` and `occurrence_of`, which begin with 0. Returns the four buffers, the number of
+    trials and the length of the longest.
+    """
+    draft = np.zeros(1, DRAFT)
+    drawn = longest = 0
+    while drawn < most and bin_of[drawn] < BATCH_BINS:
+        begin_trial(draft, offsets, bin_of[drawn], occurrence_of[drawn])
+        while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
+            channels, offsets, onsets, classes = longer_buffers(
+                world, channels, offsets, onsets, classes, draft
+            )
+        drawn += 1
+        bin_of[drawn], occurrence_of[drawn] = draft[0].bin_, draft[0].occurrence
+        longest = max(longest, bin_of[drawn] - bin_of[drawn - 1])
+    return channels, offsets, onsets, classes, drawn, longest
 
 
 def train_template(
@@ -64,27 +97,20 @@ def train_template(
     eligibility = np.empty((world.n_inputs, WIDTH))
     corrections = np.empty((1, WIDTH))
     sound = np.empty((1, WIDTH))
-    channels, offsets = np.empty(4096, np.int32), np.zeros(8192, np.int64)
+    # Buffers that a batch of the default task fits into.
+    channels, offsets = np.empty(BATCH_BINS, np.int32), np.zeros(2 * BATCH_BINS, np.int64)
     onsets, classes = np.empty(256, np.int64), np.empty(256, np.int64)
-    draft = np.zeros(1, DRAFT)
-    bin_of = np.zeros(BATCH_BINS + 2, np.int64)  # first bin and first occurrence of each trial
-    occurrence_of = np.zeros(BATCH_BINS + 2, np.int64)
+    # First bin and first occurrence of each trial, and what follows the last; a trial has a bin.
+    bin_of = np.zeros(BATCH_BINS + 1, np.int64)
+    occurrence_of = np.zeros(BATCH_BINS + 1, np.int64)
     V = np.empty((0, WIDTH))
     above = np.empty((0, WIDTH))
     counts = np.empty((0, WIDTH))
     done = 0
     while done < trials:
-        drawn = 0
-        longest = 0
-        while done + drawn < trials and bin_of[drawn] < BATCH_BINS:
-            begin_trial(draft, offsets, bin_of[drawn], occurrence_of[drawn])
-            while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
-                channels, offsets, onsets, classes = longer_buffers(
-                    world, channels, offsets, onsets, classes, draft
-                )
-            drawn += 1
-            bin_of[drawn], occurrence_of[drawn] = draft[0].bin_, draft[0].occurrence
-            longest = max(longest, bin_of[drawn] - bin_of[drawn - 1])
+        channels, offsets, onsets, classes, drawn, longest = draw_trials(
+            rng, world, trials - done, channels, offsets, onsets, classes, bin_of, occurrence_of
+        )
         owed = world.targets[classes[: occurrence_of[drawn]]]
         if longest > len(V):
             V = np.empty((2 * longest, WIDTH))
@@ -94,11 +120,11 @@ def train_template(
         log = Log(V, above, counts)
         for block in range(n_blocks):
             p = unpack(Parameters, parameters[block], zero)
-            # Taken from the tables once: a view of an array costs as much as some bins.
-            its_weights, its_overflow = weights[block], overflow[block]
-            ended = load(its_overflow, 0, zero)
-            missed = load(wrong[block], 0, zero)
-            distance = load(absolute[block], 0, zero)
+            # Out of the inner loop, where a view of an array costs as much as some bins.
+            its_weights = weights[block]
+            overflowed_in = load(overflow[block], 0, zero)
+            n_wrong = load(wrong[block], 0, zero)
+            total_error = load(absolute[block], 0, zero)
             for k in range(drawn):
                 heard = Heard(
                     channels,
@@ -110,9 +136,9 @@ def train_template(
                 outcome, _ = run_trial(p, mode, its_weights, heard, log)
                 error = outcome.label - outcome.emitted
                 error = where(error < 0.0, zero - error, error)
-                missed = missed + where(error > WRONG_BEYOND, 1.0, zero)
-                distance = distance + error
-                c = where(ended < 0.0, correction(outcome), zero)
+                n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
+                total_error = total_error + error
+                c = where(overflowed_in < 0.0, correction(outcome), zero)
                 if any_lane(c != 0.0):
                     store(corrections, 0, c)
                     learn_trial(
@@ -127,10 +153,10 @@ def train_template(
                         sound,
                     )
                     failed = (c != 0.0) & (load(sound, 0, zero) == 0.0)
-                    ended = where(failed, float(first_trial + done + k), ended)
-            store(its_overflow, 0, ended)
-            store(wrong[block], 0, missed)
-            store(absolute[block], 0, distance)
+                    overflowed_in = where(failed, float(first_trial + done + k), overflowed_in)
+            store(overflow[block], 0, overflowed_in)
+            store(wrong[block], 0, n_wrong)
+            store(absolute[block], 0, total_error)
         done += drawn
     return wrong, absolute
 
@@ -165,9 +191,10 @@ def survive_template(
             p = unpack(Parameters, parameters[block], zero)
             state = unpack(State, states[block], zero)
             survived = load(bins[block], 0, zero)
+            its_weights = weights[block]
             count = zero
             for t in range(n_bins):
-                drive = drive_at(weights[block], channels, offsets, t, zero)
+                drive = drive_at(its_weights, channels, offsets, t, zero)
                 state, response = step(p, mode, state, drive)
                 count = count + where(response.spike, 1.0, zero)
                 most = 0.0 if t < n_noise else owed

@@ -123,7 +123,8 @@ def learn_trial_template(
     """The learning step after a trial, in the lanes whose correction is not 0.
 
     Works through the block in pieces of LEARN_WIDTH lanes and leaves out those with nothing to
-    learn. Sets `sound` (1, WIDTH) to 0 where a weight would have overflowed, else to 1.
+    learn. Sets `sound` (1, WIDTH), in lanes whose correction is not 0, to 0 where a weight would
+    have overflowed, else to 1.
     """
     for first in range(0, WIDTH, LEARN_WIDTH):
         part = slice(first, first + LEARN_WIDTH)

@@ -30,7 +30,7 @@ class Outcome(NamedTuple):
     label: Any
     """Output spikes owed: the aggregate label."""
     blamed: Any
-    """Whether the error trace E is anything but zero."""
+    """Whether the error trace E is anything but zero; of noise only where the rule uses E."""
 
 
 class RuleParameters(NamedTuple):

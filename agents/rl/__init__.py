@@ -17,11 +17,13 @@ from agents.rl.folder import load, save
 from agents.rl.recipes import RECIPES, Recipe, make_rl_agent, training_env
 from agents.rl.sb3_agent import SB3Agent
 from agents.rl.senses import RAW, TRACES, Senses
+from agents.rl.vec_env import PatternVecEnv
 
 __all__ = [
     "RAW",
     "RECIPES",
     "TRACES",
+    "PatternVecEnv",
     "Recipe",
     "SB3Agent",
     "Senses",

@@ -23,6 +23,8 @@ from benchmarks.timing import Settings, Subject, race
 
 UNIT = "million steps/s"
 COPIES = 1_024
+TRIAL_BINS = 200
+"""Mean length of a trial."""
 TRIAL, STREAM = "gnm/PatternTrial-v0", "gnm/PatternStream-v0"
 
 
@@ -98,15 +100,21 @@ def _single(name: str, env: gym.Env[Any, Any], steps: int) -> Subject:
 
 
 def vector(settings: Settings) -> Findings:
-    """Steps of 1,024 copies at once, beside Gymnasium's own native vector environment."""
+    """Steps of 1,024 copies at once, beside Gymnasium's own native vector environment.
+
+    Trials begin and end at different times, as they do once the environments have run for long.
+    """
     steps = 500 if settings.quick else 3_000
     pole = "CartPole-v1"
     subjects = [_many(pole, _made(pole), steps, random=True)]
-    for id in (TRIAL, STREAM):
-        subjects.append(_many(id, _made(id), steps))
-        subjects.append(_many(f"{id}, copy=False", _made(id, copy=False), steps))
-    subjects.append(_many(f"{STREAM}, random answers", _made(STREAM), steps, random=True))
-    loop = gym.make_vec(TRIAL, num_envs=COPIES, vectorization_mode="sync")
+    for copy in (True, False):
+        how = "" if copy else ", copy=False"
+        subjects.append(_many(f"{TRIAL}{how}", staggered(_made(TRIAL, copy=copy)), steps))
+        streams = _made(STREAM, copy=copy)
+        subjects.append(_many(f"{STREAM}{how}, never answering", streams, steps))
+        streams = _made(STREAM, copy=copy)
+        subjects.append(_many(f"{STREAM}{how}, random answers", streams, steps, random=True))
+    loop = _made(TRIAL, mode="sync")
     subjects.append(_many(f"{TRIAL}, SyncVectorEnv", loop, steps // 50))
     targets = {
         TRIAL: [Target(1.5, of="ratio")],
@@ -126,8 +134,28 @@ def vector(settings: Settings) -> Findings:
     )
 
 
-def _made(id: str, **kwargs: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
-    return gym.make_vec(id, num_envs=COPIES, vectorization_mode="vector_entry_point", **kwargs)
+def _made(
+    id: str, mode: str = "vector_entry_point", **kwargs: Any
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    envs = gym.make_vec(id, num_envs=COPIES, vectorization_mode=mode, **kwargs)
+    envs.reset(seed=0)
+    return envs
+
+
+def staggered(
+    envs: gym.vector.VectorEnv[Any, Any, Any],
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Reset so that in each step about as many trials end as in any other.
+
+    All reset at once, they would go on ending in the same few steps for some ten thousand.
+    """
+    number = np.arange(envs.num_envs)
+    envs.reset(seed=0)
+    for t in range(TRIAL_BINS):
+        envs.step(np.zeros(envs.num_envs, np.int64))
+        if (number % TRIAL_BINS == t).any():
+            envs.reset(options={"reset_mask": number % TRIAL_BINS == t})
+    return envs
 
 
 def _many(
@@ -141,7 +169,6 @@ def _many(
         for t in range(steps):
             envs.step(rows[t & 15])
 
-    envs.reset(seed=0)
     return Subject(name, run, COPIES * steps)
 
 

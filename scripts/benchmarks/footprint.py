@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from agents.many import BYTES_PER_AGENT, BYTES_PER_WEIGHT
+from agents.memory import bytes_needed
+from benchmarks.peak_memory import task_of
 from benchmarks.rows import Findings, Row, Target
 from benchmarks.timing import Settings, Skip
-from gnm_env import Task
 
 SCRIPTS = Path(__file__).resolve().parent.parent
 MIB = 2**20
@@ -53,8 +53,9 @@ runpy.run_module("benchmarks.peak_memory", run_name="__main__")
 
 def imports(settings: Settings) -> Findings:
     """Time to import our packages, beyond that of what they stand on."""
-    program(IMPORT)  # the first may still have to write byte code
-    both = [json.loads(program(IMPORT)) for _ in range(settings.repeats)]
+    with settings.cores.only(1):
+        program(IMPORT)  # the first may still have to write byte code
+        both = [json.loads(program(IMPORT)) for _ in range(settings.repeats)]
     section = "Start"
     world = Row(
         section, "import gnm_env, beyond gymnasium and numba", "s",
@@ -72,7 +73,7 @@ def starts(settings: Settings) -> Findings:
     script = SCRIPTS / "train.py"
     if not script.exists():
         raise Skip("scripts/train.py is not there")
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, settings.cores.only(1):
         arguments = (str(script), "--trials", "1000", "--out", str(Path(folder) / "out"))
         environment = {"NUMBA_CACHE_DIR": str(Path(folder) / "cache")}
         first, n_first = _start(arguments, environment)
@@ -106,25 +107,27 @@ def memory(settings: Settings) -> Findings:
     if not Path("/proc/self/clear_refs").exists():
         raise Skip("peak memory is read from /proc, which this system lacks")
     cases = [
-        (100, 64, 100),
-        (100, 1_024, 100),
-        (100, 4_096, 100),
-        (1_000, 1_024, 100),
-        (1_000, 4_096, 100),
-        (100, 64, 100_000),
-        (100, 1_024, 100_000),
-        (100, 64, 1_000_000),
+        (100, 64, 100, 1),
+        (100, 1_024, 100, 1),
+        (100, 4_096, 100, 1),
+        (1_000, 1_024, 100, 1),
+        (1_000, 4_096, 100, 1),
+        (100, 64, 100_000, 1),
+        (100, 1_024, 100_000, 1),
+        (100, 1_024, 100_000, 2),
+        (100, 64, 1_000_000, 1),
     ]
     if settings.quick:
         cases = cases[1:6:2]
     rows = []
-    for n_inputs, lanes, length in cases:
-        text = program(PEAK, n_inputs, lanes, length)
-        allowed = stated(n_inputs, lanes, length)
+    for n_inputs, lanes, length, threads in cases:
+        text = program(PEAK, n_inputs, lanes, length, threads)
+        allowed = bytes_needed(n_inputs * lanes, lanes, task_of(n_inputs, length), threads)
+        also = ", two threads" if threads == 2 else ""
         rows.append(
             Row(
                 "Peak memory of train_many, agents included",
-                f"N = {n_inputs:,}, {lanes:,} neurons, longest trial {length:,} bins",
+                f"N = {n_inputs:,}, {lanes:,} neurons, longest trial {length:,} bins{also}",
                 "MiB",
                 (json.loads(text) / MIB,),
                 more_is_better=False,
@@ -132,18 +135,6 @@ def memory(settings: Settings) -> Findings:
             )
         )
     return Findings(rows=rows)
-
-
-def stated(n_inputs: int, lanes: int, longest: int) -> float:
-    """Most bytes that `train_many` may take: O(N · lanes + longest trial · block).
-
-    Per weight and per neuron: see `agents.many.BYTES_PER_WEIGHT`. Per bin of the longest trial:
-    potential and whether it is above threshold for one block of 32 neurons (512), its offset
-    (16) and its spikes (4 bytes each), in buffers that grow by doubling.
-    """
-    spikes = Task().rate * n_inputs
-    neurons = lanes * (BYTES_PER_WEIGHT * n_inputs + BYTES_PER_AGENT)
-    return neurons + (512 + 16 + 8 * spikes) * longest + 4 * MIB
 
 
 def program(text: str, *arguments: Any, **environment: str) -> str:

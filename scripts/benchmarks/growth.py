@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 
 from agents import GNM, AggregateLabel
+from benchmarks.environments import staggered
 from benchmarks.rows import Curve, Findings, Row, Target
 from benchmarks.timing import Settings, Skip, Subject, Timing, race
 from benchmarks.training import LANES, learning, neurons
@@ -123,13 +124,13 @@ def _stepping(n: int, steps: int) -> Subject:
         )
     except (gym.error.Error, ImportError, TypeError) as error:
         raise Skip(f"there is no native vector environment: {error}") from None
+    staggered(envs)
     actions = np.zeros(n, np.int64)
 
     def run(_: Any) -> None:
         for _ in range(steps):
             envs.step(actions)
 
-    envs.reset(seed=0)
     return Subject(str(n), run, n * steps)
 
 

@@ -8,6 +8,14 @@ from itertools import groupby
 from statistics import median
 from typing import Any
 
+from agents.memory import (
+    BYTES_AT_LEAST,
+    BYTES_PER_AGENT,
+    BYTES_PER_BIN,
+    BYTES_PER_SPIKE,
+    BYTES_PER_WEIGHT,
+)
+from agents.neuron_lanes import LANES_PER_BLOCK
 from benchmarks.rows import BEST_ONLY, MET, MISSED, Curve, Findings, Row, Target
 from progress import duration
 
@@ -140,11 +148,12 @@ neuron living through one bin of one trial, with its part of the learning. Every
 before the clock started, except where the start is what is measured.
 """
 
-MEMORY = """\
-Training n neurons with N inputs side by side takes at most 56·N·n + 14,000·n + (528 + 8·N·p)·T \
-bytes and 4 MiB, where p is the rate of input spikes and T the longest trial in bins: \
-O(N·n + T·block), with blocks of 32 neurons. The agents are counted. The table above compares this \
-with the peak of the resident memory."""
+MEMORY = f"""\
+Training n neurons with N inputs side by side takes at most {BYTES_PER_WEIGHT}·N·n + \
+{BYTES_PER_AGENT:,}·n + ({BYTES_PER_BIN} + {BYTES_PER_SPIKE}·N·p)·T·threads bytes and \
+{BYTES_AT_LEAST // 2**20} MiB, where p is the rate of input spikes and T the longest trial in \
+bins: O(N·n + T·block), with blocks of {LANES_PER_BLOCK} neurons, one block per thread. The agents \
+are counted. The table above compares this with the peak of the resident memory."""
 
 
 def page(found: Findings, with_picture: bool = True) -> str:

@@ -40,8 +40,8 @@ MAP_SEEDS = 5
 TRIALS = 60_000
 """Length of a training in the paper."""
 MAP_PART = {False: 393, True: 65}
-"""Cells per pattern seed that stand for the 1,681, quick or not: they fill the blocks of lanes of
-two threads evenly, as the 1,681 do."""
+"""Cells per pattern seed that stand for the 1,681, quick or not. Two threads share them less evenly
+than the 1,681, so that the estimate is rather too long."""
 RUNS, CAP = 100, 10_000
 """The paper's measure: streams, and most bins of each."""
 

@@ -12,6 +12,8 @@ import pytest
 
 from agents import GNM, AggregateLabel, NeuronAgent, train, train_many
 from agents.many import lane_groups
+from agents.memory import bytes_needed
+from agents.policy import as_agent
 from gnm_env import Patterns, Task
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, trial_env
 
@@ -64,9 +66,45 @@ def test_the_loop_refuses_numbers_out_of_range_too(keywords: dict[str, Any], mes
 def test_agents_that_would_not_fit_into_memory_are_refused_before_anything_is_allocated() -> None:
     task = Task(n_inputs=50_000_000, rate=1e-9, pattern_bins=1)
     weights = np.broadcast_to(0.1, 50_000_000)  # takes no room
-    agents = [SimpleNamespace(weights=weights)] * 10_000
-    with pytest.raises(ValueError, match=r"needs 26,[\d,.]+ GiB, this machine has [\d,.]+"):
+    agents = [SimpleNamespace(weights=weights, group_key=None)] * 10_000
+    with pytest.raises(ValueError, match=r"need 26,[\d,.]+ GiB, this machine has [\d,.]+"):
         lane_groups(agents, task, None, 1)  # type: ignore[arg-type]
+
+
+def test_trials_that_would_not_fit_into_memory_are_refused_before_they_are_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("agents.memory.bytes_there", lambda: 2.0**33)
+    task = Task(n_inputs=12, background_bins=10**8 - 200)
+    with pytest.raises(ValueError, match="take fewer agents at a time, shorter trials or fewer"):
+        train_many([busy_agent()], task, Patterns.draw(task, 0), 1)
+
+
+def test_every_thread_counts_with_a_trial_of_its_own() -> None:
+    one, two = (bytes_needed(0, 64, Task(background_bins=10**6), threads) for threads in (1, 2))
+    assert one == pytest.approx(64 * 14_000 + 532 * 1_000_100 + 2**22)
+    assert two - one == pytest.approx(532 * 1_000_100)
+
+
+class Silent:
+    """A policy: it can be scored, and cannot learn."""
+
+    def predict(self, observation: Any, *_: Any, **__: Any) -> tuple[Any, None]:
+        return np.zeros(len(observation), int), None
+
+
+@pytest.mark.parametrize(
+    ("agent", "why"),
+    [
+        (1, "agents must be agents, such as NeuronAgent makes, got 1 as agent 1"),
+        (Silent(), "agents must be agents, such as NeuronAgent makes"),
+        (as_agent(Silent()), "agents must be able to learn, but agent 1 is a .*only be scored"),
+    ],
+    ids=["a number", "a policy", "a policy that can be scored"],
+)
+def test_what_cannot_learn_is_refused(agent: Any, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        train_many([busy_agent(), agent], BUSY, BUSY_PATTERNS, 1)
 
 
 @pytest.mark.parametrize("n_agents", [1, 63, 64, 400, 1_100])

@@ -52,3 +52,47 @@ def test_an_edit_to_a_called_function_in_another_file_is_noticed(tmp_path: Path)
     assert answer(1) == ("12", "0")
     assert answer(1) == ("12", "1")
     assert answer(5) == ("16", "0")
+
+
+def test_an_edit_to_a_bound_function_of_another_package_is_noticed(tmp_path: Path) -> None:
+    """As of a neuron of one's own, whose `step` the kernels bind."""
+    (tmp_path / "templates.py").write_text("def template(x):\n    return step(x) + 1\n")
+
+    def answer(increment: int) -> tuple[str, ...]:
+        (tmp_path / "mine.py").write_text(
+            "from gnm_env.compiled import compiled\n"
+            f"def plain(x):\n    return x + {increment}\n"
+            "helper = compiled(plain)\n"
+            "@compiled\n"
+            "def step(x):\n"
+            "    return helper(x)\n"
+        )
+        code = (
+            "import mine, templates\n"
+            "from gnm_env.compiled import specialise\n"
+            "bound = specialise(templates.template, 'mine', step=mine.step)\n"
+            "print(bound(10), sum(bound.stats.cache_hits.values()))"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return tuple(done.stdout.split())
+
+    assert answer(1) == ("12", "0")
+    assert answer(1) == ("12", "1")
+    assert answer(5) == ("16", "0")
+
+
+def test_a_bound_function_that_was_typed_in_needs_no_file(tmp_path: Path) -> None:
+    (tmp_path / "templates.py").write_text("def template(x):\n    return step(x) + 1\n")
+    code = (
+        "import templates\n"
+        "from numba import njit\n"
+        "from gnm_env.compiled import specialise\n"
+        "step = njit(lambda x: x + 1)\n"
+        "print(specialise(templates.template, 'typed', step=step)(10))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "12"

@@ -12,38 +12,48 @@ from numpy.typing import NDArray
 from gnm_env.reused import ReusedRows
 
 
-def test_rows_are_empty_whatever_was_written_before() -> None:
+def lend(reused: ReusedRows, places: list[int], entry: Any = "here") -> list[NDArray[Any]]:
+    for row in reused.rows(places):
+        for place in places:
+            row[place] = entry
+    return reused.lent()
+
+
+def test_what_is_lent_is_empty_but_where_it_was_written_to() -> None:
     reused = ReusedRows(2, 5)
     for places in ([0, 3], [], [4], [0, 1, 2, 3, 4], [2]):
-        rows = reused.rows(places)
-        assert [row.tolist() for row in rows] == [[None] * 5] * 2
-        for row in rows:
-            row[places] = "here"
-        del rows, row
+        expected = ["here" if place in places else None for place in range(5)]
+        assert [row.tolist() for row in lend(reused, places)] == [expected] * 2
 
 
 def test_rows_that_nobody_has_kept_are_used_again() -> None:
     reused = ReusedRows(2, 5)
-    addresses = {reused.rows([k])[0].ctypes.data for k in range(5)}
+    addresses = {lend(reused, [k])[0].ctypes.data for k in range(5)}
     assert len(addresses) == 1
+
+
+def test_what_is_lent_cannot_be_written_to() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        lend(ReusedRows(2, 5), [1])[0][:] = "mine"
 
 
 @pytest.mark.parametrize(
     "keep",
-    [lambda rows: rows[0], lambda rows: rows[0][1:4], lambda rows: rows[0].reshape(5, 1)],
-    ids=["a row", "a part", "another shape"],
+    [
+        lambda rows: rows[0],
+        lambda rows: rows[0][1:4],
+        lambda rows: rows[0][1:][:2],
+        lambda rows: rows[0].reshape(5, 1),
+    ],
+    ids=["a row", "a part", "a part of a part", "another shape"],
 )
 def test_what_somebody_has_kept_stays_as_it_was(
     keep: Callable[[list[NDArray[Any]]], NDArray[Any]],
 ) -> None:
     reused = ReusedRows(2, 5)
-    rows = reused.rows([2])
-    rows[0][2] = ["mine"]
-    kept = keep(rows)
+    kept = keep(lend(reused, [2], ["mine"]))
     was = kept.tolist()
-    del rows
     for _ in range(3):
-        for row in reused.rows([2]):
-            row[2] = ["another's"]
+        lend(reused, [2], ["another's"])
     assert kept.tolist() == was
     assert np.count_nonzero(kept != None) == 1  # noqa: E711, elementwise

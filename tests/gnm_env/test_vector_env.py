@@ -378,7 +378,8 @@ class TestBadInput:
             ({"num_envs": 0}, "num_envs must be >= 1, got 0"),
             ({"num_envs": -3}, "num_envs must be >= 1, got -3"),
             ({"num_envs": 2.5}, "num_envs must be a whole number, got 2.5"),
-            ({"max_episode_steps": 0}, "max_episode_steps must be >= 1, got 0"),
+            ({"max_episode_steps": 0}, "max_episode_steps must be in 1 … 1073741823, got 0"),
+            ({"max_episode_steps": 2**30}, "must be in 1 … 1073741823, got 1073741824"),
             ({"render_mode": "rgb_array"}, "render_mode must be None, got 'rgb_array'"),
             ({"autoreset_mode": "sometimes"}, "'sometimes' is not a valid AutoresetMode"),
             ({"n_classes": 0}, "n_classes must be >= 1, got 0"),
@@ -484,6 +485,14 @@ class TestBadInput:
     def test_seeds_that_are_no_whole_numbers(self, id: str, seed: Any) -> None:
         with pytest.raises(ValueError, match="seed must be a whole number or one per environment"):
             native(id).reset(seed=seed)
+
+    @each_id
+    def test_a_seed_that_is_refused_changes_none(self, id: str) -> None:
+        envs = native(id)
+        envs.reset(seed=1)
+        with pytest.raises(gym.error.Error, match="greater or equal to zero"):
+            envs.reset(seed=[7, 8, -1, 9, 10])
+        assert envs.np_random_seed == (1, 2, 3, 4, 5)
 
     @each_id
     @pytest.mark.parametrize(

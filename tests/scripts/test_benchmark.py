@@ -356,6 +356,8 @@ def test_the_command_ends_with_json_and_can_be_shown_again(tmp_path: Path) -> No
         (["--repeats", 0], "--repeats must be >= 1, got 0"),
         (["--seed", -1], "--seed must be >= 0, got -1"),
         (["--quick", "--full"], "exclude each other"),
+        (["--quick", "--only", "loop", "--publish"], "not one with --quick and --only"),
+        (["--repeats", 2, "--publish"], "not one with --repeats"),
         (["--last"], "run the benchmark without --last first"),
         (["--only", "nothing"], "invalid choice"),
     ],
@@ -379,4 +381,6 @@ def test_memory_is_what_is_stated(settings: Settings) -> None:
 @pytest.mark.slow
 def test_a_later_start_compiles_nothing(settings: Settings) -> None:
     rows = footprint.starts(replace(settings, repeats=1)).rows
+    (compiled,) = re.findall(r"([\d,]+) functions are compiled", rows[0].note)
+    assert int(compiled.replace(",", "")) > 10  # else nothing was counted
     assert [each.values for each in rows if each.unit == "functions"] == [(0.0,)]

@@ -37,6 +37,11 @@ def test_a_model_of_stable_baselines_is_scored():
     assert run(blocks(PAGES[0])[2])["agent"].n_inputs == 100
 
 
+def test_thousands_of_streams_end_with_their_labels():
+    names = run(blocks(PAGES[0])[3])
+    assert names["labels"].size > 0 and names["labels"].min() >= 0
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_lead_somewhere(page):
     targets = re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text())
