@@ -30,6 +30,17 @@ def compiled(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """As `compiled`, but made a part of every compiled function that calls it.
+
+    For what is called so often that the call itself costs something: numba counts references to
+    each array that is handed over, and hands over a tuple field by field.
+    """
+    dispatcher: Any = njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    dispatcher._cache = _Cache(function)
+    return dispatcher
+
+
 def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any:
     """Compile `template` with some of its global names bound to other functions or constants.
 

@@ -25,20 +25,21 @@ class ReusedRows:
     """
 
     def __init__(self, n_rows: int, length: int) -> None:
-        self._n_rows, self._length = n_rows, length
+        self._shape = (n_rows, length)
         self._renew()
         self._unlent = self._references()
 
     def _renew(self) -> None:
-        self._rows = [np.empty(self._length, object) for _ in range(self._n_rows)]
-        self._views = [row[:] for row in self._rows]
+        self._block = np.empty(self._shape, object)
+        self._rows = list(self._block)
+        self._views = list(self._block)
         for view in self._views:
             view.setflags(write=False)
         self._written: Sequence[int] = ()
 
     def _references(self) -> int:
-        """References to all these arrays; whoever keeps one, or a part of one, adds to them."""
-        return sum(map(sys.getrefcount, self._rows)) + sum(map(sys.getrefcount, self._views))
+        """References to what is lent, and to the block, which every part of what is lent holds."""
+        return sum(map(sys.getrefcount, self._views), sys.getrefcount(self._block))
 
     def rows(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """The rows, each of them None everywhere, for their owner to write to `places` only."""
@@ -53,4 +54,4 @@ class ReusedRows:
 
     def lent(self) -> list[NDArray[Any]]:
         """The same rows for others, who can keep them but not write to them."""
-        return self._views.copy()
+        return self._views

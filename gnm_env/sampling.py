@@ -20,7 +20,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.compiled import compiled
+from gnm_env.compiled import compiled, inlined
 from gnm_env.task import World
 
 PIECE_BINS = 2_048
@@ -243,7 +243,7 @@ def begin_trial(
     d.class_, d.label, d.noise_done, d.n_events = 0, 0, 0, offsets[bin_]
 
 
-@compiled
+@inlined
 def fill_trial(
     rng: Generator,
     world: World,

@@ -31,11 +31,14 @@ from gnm_env.vector_kernels import (
     SIGN,
     STREAM_STATE,
     TRIAL_STATE,
+    StreamResults,
+    TrialResults,
     begin_streams,
     begin_trials,
     clear_rows,
     event_shift,
     new_crowd,
+    report_of,
     step_streams,
     step_trials,
 )
@@ -116,6 +119,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self._observations = np.zeros((self.num_envs, task.n_inputs), np.int8)
         self._finals = np.zeros_like(self._observations)
         self._over = np.zeros(self.num_envs, np.int64)
+        self._heads = np.zeros((self.num_envs, 5), np.int64)
         self._n_over = 0
         self._generators: Generators | None = None
         self._seeds: list[int | None] = []
@@ -125,6 +129,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self,
         state: NDArray[Any],
         emitted: NDArray[Any],
+        results: TrialResults | StreamResults,
         most: float,
         feedback: int = COST,
         tolerance: float = 0.0,
@@ -143,6 +148,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             self._observations,
             self._over,
             self._finals,
+            results,
+            self._heads,
         )
 
     def _event_type(self) -> type[np.signedinteger[Any]]:
@@ -258,6 +265,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         return self._observations.copy() if self.copy else self._observations
 
     def _require_reset(self) -> None:
+        """ResetNeeded unless every environment can take a step."""
         if self._crowd is None:
             raise ResetNeeded("call reset() before step()")
         if self._n_over and self._by_hand:
@@ -269,7 +277,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
         """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
         checked = np.asarray(actions)
-        if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
+        if checked.shape != self._over.shape or checked.dtype.kind not in "iub":
             raise ValueError(
                 f"actions must be whole numbers of shape ({self.num_envs},), one per environment, "
                 f"got {checked.dtype} of shape {checked.shape}"
@@ -342,15 +350,18 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             copy,
             render_mode,
         )
-        self._emitted = np.zeros(self.num_envs, np.float64 if self._graded else np.int64)
-        self._report = np.zeros(64, np.int64)
-        self._lists = ReusedRows(3, self.num_envs)
-        self._clean_results()
-
-    def _clean_results(self) -> None:
-        """New arrays for labels and outputs; the old ones now belong to the caller of `step`."""
-        self._labels = np.zeros(self.num_envs, np.int64)
-        self._outputs = np.zeros(self.num_envs, self._emitted.dtype)
+        n, amount = self.num_envs, np.float64 if self._graded else np.int64
+        self._emitted = np.zeros(n, amount)
+        self._results = TrialResults(
+            rewards=np.zeros(n),
+            terminated=np.zeros(n, np.bool_),
+            truncated=np.zeros(n, np.bool_),
+            labels=np.zeros(n, np.int64),
+            outputs=np.zeros(n, amount),
+            pattern_bins=np.zeros(n, np.int64),
+        )
+        self._report = np.zeros(0, np.int64)
+        self._lists = ReusedRows(3, n)
 
     def _most_bins(self) -> float:
         # A Poisson number exceeds this with a probability below 1e-80.
@@ -363,33 +374,33 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             self._crowd = self._new_crowd(
                 np.zeros(self.num_envs, TRIAL_STATE),
                 self._emitted,
+                self._results,
                 self.max_output if self._graded else 1.0,
                 FEEDBACK_NUMBER[self.feedback],
                 self.tolerance,
             )
+            self._report = report_of(self._crowd)
         begin_trials(self._crowd, which)
 
     def step(self, actions: NDArray[Any]) -> Step:
         self._require_reset()
-        n = self.num_envs
-        rewards, terminated, truncated = np.zeros(n), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
         answers = self._amounts(actions) if self._graded else self._spikes(actions)
-        bad, self._n_over, length, self._report = step_trials(
-            self._crowd,
-            answers,
-            rewards,
-            terminated,
-            truncated,
-            self._labels,
-            self._outputs,
-            self._report,
-        )
+        bad, self._n_over, n_told, is_new = step_trials(self._crowd, answers)
         if bad >= 0:
             raise self._no_amount(actions, bad) if self._graded else self._no_spike(actions, bad)
+        if is_new:
+            self._report = report_of(self._crowd)
+        results = self._results
         info: dict[str, Any] = {}
         if self._n_over:
-            info = self._info(self._terminal_info(terminated, length))
-        return self._seen(), rewards, terminated, truncated, info
+            info = self._info(self._terminal_info(n_told))
+        return (
+            self._seen(),
+            results.rewards.copy(),
+            results.terminated.copy(),
+            results.truncated.copy(),
+            info,
+        )
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
@@ -407,28 +418,23 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             f"got {np.asarray(actions)[bad, 0]!r} for environment {bad}"
         )
 
-    def _terminal_info(self, terminated: NDArray[np.bool_], length: int) -> dict[str, Any]:
-        if length == 0:  # truncated only
+    def _terminal_info(self, n_told: int) -> dict[str, Any]:
+        """The info of `n_told` trials at their end, from the results and the report."""
+        if n_told == 0:  # truncated only
             return {}
-        labels, outputs = self._labels, self._outputs
-        self._clean_results()
-        n_pattern, pattern_bins = self.task.pattern_bins, np.zeros(self.num_envs, np.int64)
-        onsets, classes, targets = self._lists.rows(self._over[: self._n_over].tolist())
-        numbers = self._report[:length].tolist()
-        end = 0
-        while end < length:
-            i, k, first = numbers[end], numbers[end + 1], end + 2
-            second, third, end = first + k, first + 2 * k, first + 3 * k
+        heads = self._heads[:n_told].tolist()
+        numbers = self._report[: heads[-1][-1]].tolist()
+        onsets, classes, targets = self._lists.rows([head[0] for head in heads])
+        for i, first, second, third, end in heads:
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
             targets[i] = numbers[third:end]
-            pattern_bins[i] = n_pattern
         onsets, classes, targets = self._lists.lent()
-        mask = _read_only(terminated)
+        results, mask = self._results, _read_only(self._results.terminated)
         return {
-            "label": labels,
+            "label": results.labels.copy(),
             "_label": mask,
-            "emitted": outputs,
+            "emitted": results.outputs.copy(),
             "_emitted": mask,
             "onsets": onsets,
             "_onsets": mask,
@@ -436,7 +442,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             "_classes": mask,
             "targets": targets,
             "_targets": mask,
-            "pattern_bins": pattern_bins,
+            "pattern_bins": results.pattern_bins.copy(),
             "_pattern_bins": mask,
         }
 
@@ -474,9 +480,16 @@ class PatternStreamVectorEnv(PatternVectorEnv):
             copy,
             render_mode,
         )
-        self._state = np.zeros(self.num_envs, STREAM_STATE)
+        n = self.num_envs
+        self._state = np.zeros(n, STREAM_STATE)
         self._state["anew"] = 1
-        self._clean_results()
+        self._results = StreamResults(
+            rewards=np.zeros(n),
+            terminated=np.zeros(n, np.bool_),
+            truncated=np.zeros(n, np.bool_),
+            mistakes=np.zeros(n, np.int64),
+            classes=np.zeros(n, np.int64),
+        )
 
     def _most_bins(self) -> float:
         return PIECE_BINS + self.task.pattern_bins
@@ -486,41 +499,36 @@ class PatternStreamVectorEnv(PatternVectorEnv):
 
     def _begin(self, which: NDArray[np.int64]) -> None:
         if self._crowd is None:
-            self._crowd = self._new_crowd(self._state, np.zeros(0, np.int64), most=1.0)
+            self._crowd = self._new_crowd(
+                self._state, np.zeros(0, np.int64), self._results, most=1.0
+            )
         begin_streams(self._crowd, which)
 
     def step(self, actions: NDArray[Any]) -> Step:
         self._require_reset()
-        n = self.num_envs
-        rewards, terminated, truncated = np.empty(n), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-        bad, self._n_over = step_streams(
-            self._crowd,
-            self._spikes(actions),
-            rewards,
-            terminated,
-            truncated,
-            self._mistakes,
-            self._classes,
-        )
+        bad, self._n_over = step_streams(self._crowd, self._spikes(actions))
         if bad >= 0:
             raise self._no_spike(actions, bad)
+        results = self._results
         info: dict[str, Any] = {}
         if self._n_over:
-            info = self._info(self._terminal_info(terminated))
-        return self._seen(), rewards, terminated, truncated, info
+            info = self._info(self._terminal_info())
+        return (
+            self._seen(),
+            results.rewards.copy(),
+            results.terminated.copy(),
+            results.truncated.copy(),
+            info,
+        )
 
-    def _terminal_info(self, terminated: NDArray[np.bool_]) -> dict[str, Any]:
-        if not terminated.any():  # truncated only
+    def _terminal_info(self) -> dict[str, Any]:
+        """The info of streams that a mistake has ended, from the results."""
+        results = self._results
+        if not results.terminated.any():  # truncated only
             return {}
-        names, classes = NAMES[self._mistakes], self._classes
-        self._clean_results()
-        mask = _read_only(terminated)
+        mask = _read_only(results.terminated)
+        names, classes = NAMES[results.mistakes], results.classes.copy()
         return {"mistake": names, "_mistake": mask, "class": classes, "_class": mask}
-
-    def _clean_results(self) -> None:
-        """New arrays for the mistakes; the old ones now belong to the caller of `step`."""
-        self._mistakes = np.zeros(self.num_envs, np.int64)
-        self._classes = np.zeros(self.num_envs, np.int64)
 
 
 def _read_only(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ All of this is in one struct, since an argument costs a compiled call as much as
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -24,7 +24,13 @@ from numba.experimental import structref
 from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled
-from gnm_env.sampling import DRAFT, append_piece, begin_trial, fill_trial, longer_buffers
+from gnm_env.sampling import (
+    DRAFT,
+    append_piece,
+    begin_trial,
+    fill_trial,
+    longer_buffers,
+)
 from gnm_env.scoring import compiled_mistake_in_pattern, compiled_reward_for
 from gnm_env.task import World
 
@@ -52,6 +58,27 @@ STREAM_STATE = np.dtype(
         ("anew", np.int64),  # the generator is new, and so is the stream
     ]
 )
+
+
+class TrialResults(NamedTuple):
+    """What a step of trials tells, (n,) each; zero where there is nothing to tell."""
+
+    rewards: NDArray[np.float64]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    labels: NDArray[np.int64]
+    outputs: NDArray[Any]
+    pattern_bins: NDArray[np.int64]
+
+
+class StreamResults(NamedTuple):
+    """What a step of streams tells, (n,) each; numbers and classes of mistakes."""
+
+    rewards: NDArray[np.float64]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    mistakes: NDArray[np.int64]
+    classes: NDArray[np.int64]
 
 
 @structref.register
@@ -90,8 +117,17 @@ structref.define_constructor(
         "over",  # over[:n_over]: the environments that the last step ended
         "n_over",
         "finals",  # their last observations, under SAME_STEP
+        "results",  # TrialResults or StreamResults of the last step
+        "report",  # of the trials that it ended: onsets, classes and targets of each
+        "heads",  # int64 (n, 5): environment, where these three begin, and their end
+        "n_told",  # number of these trials
         "looks",  # room for a number per environment, and again
         "ended",
+        "channels",  # room for what is drawn
+        "offsets",
+        "onsets",
+        "classes",
+        "draft",
     ],
 )
 
@@ -111,16 +147,21 @@ def new_crowd(
     observations: NDArray[np.int8],
     over: NDArray[np.int64],
     finals: NDArray[np.int8],
+    results: Any,
+    heads: NDArray[np.int64],
 ) -> Any:
     """A Crowd in which no environment has begun."""
     n = observations.shape[0]
     return Crowd(
         held, world, autoreset, limit, most, feedback, tolerance,
-        np.zeros((4, n + 16), np.uint32), state, emitted,
+        np.zeros((4, n), np.uint32), state, emitted,
         events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
         # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
         observations, np.empty(2 * observations.size + 1, np.uint64), 0,
-        over, 0, finals, np.empty(n, np.uint32), np.empty(n, np.uint32),
+        over, 0, finals, results, np.empty(64, np.int64), heads, 0,
+        np.empty(n, np.uint32), np.empty(n, np.uint32),
+        np.empty(1_024, np.int32), np.zeros(1_024, np.int64), np.empty(64, np.int64),
+        np.empty(64, np.int64), np.zeros(1, DRAFT),
     )  # fmt: skip
 
 
@@ -147,14 +188,16 @@ def _widened(rows: NDArray[Any], width: int) -> NDArray[Any]:
 
 @compiled
 def _store(
-    row: NDArray[Any],
+    events: NDArray[Any],
+    i: int,
     shift: int,
     n_bins: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
 ) -> None:
-    """Put the spikes of `n_bins` bins into a row of the events, and their end behind them."""
+    """Put the spikes of `n_bins` bins into row `i` of the events, and their end behind them."""
     n_events = offsets[n_bins]
+    row = events[i]
     for e in range(n_events):
         row[e] = 0
     # Every bin is written to where its spikes begin; an empty one is overwritten by the next, and
@@ -280,60 +323,82 @@ def _first_bad_action(actions: NDArray[Any], most: float, over: NDArray[np.int64
 @compiled
 def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
     """Draw a trial for each environment in `which` and show its first bin; their rows are clear."""
-    if which.size == 0:
-        return
-    channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
-    offsets[0] = 0
-    onsets, classes = np.empty(64, np.int64), np.empty(64, np.int64)
-    draft = np.zeros(1, DRAFT)
-    held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
-    events, parts, shift = crowd.events, crowd.parts, crowd.shift
-    bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
-    for i in which:
-        begin_trial(draft, offsets, 0, 0)
-        while not fill_trial(held[i], world, channels, offsets, onsets, classes, draft):
-            channels, offsets, onsets, classes = longer_buffers(
-                world, channels, offsets, onsets, classes, draft
-            )
-        s, n_bins = state[i], draft[0].bin_
-        s.n_occurrences, s.label = draft[0].occurrence, draft[0].label
-        if offsets[n_bins] >= events.shape[1]:
-            events = _widened(events, offsets[n_bins] + 1)
-        if s.n_occurrences > parts.shape[1]:
-            parts = _widened(parts, s.n_occurrences)
-        _store(events[i], shift, n_bins, channels, offsets)
-        for k in range(s.n_occurrences):
-            parts[i, k] = (onsets[k] << 32) + classes[k]
-        s.occurrence, s.given = 0, 0.0
-        emitted[i] = 0
-        bins[i], cursors[i], deadlines[i] = 0, 0, crowd.limit
-    crowd.events, crowd.parts = events, parts
+    n_begun = 0
+    is_new = True
+    while n_begun < which.size:
+        n_begun = _draw_trials(crowd, which, n_begun, is_new)
+        if n_begun < which.size:
+            is_new = False
+            _make_room(crowd)
     _show_first(crowd, which)
+
+
+@compiled
+def _draw_trials(crowd: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
+    """Draw trials for `which[first:]`, the first of them perhaps begun already (`is_new` False).
+
+    Returns the number of the environment for which there was not enough room, or that of all. No
+    array is exchanged for a longer one in here: numba counts references to those that are.
+    """
+    held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
+    events, parts, shift, limit = crowd.events, crowd.parts, crowd.shift, crowd.limit
+    bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
+    channels, offsets, onsets, classes = crowd.channels, crowd.offsets, crowd.onsets, crowd.classes
+    draft = crowd.draft
+    n = first
+    fits = True
+    while fits and n < which.size:
+        i = which[n]
+        if is_new:
+            begin_trial(draft, offsets, 0, 0)
+        fits = fill_trial(held[i], world, channels, offsets, onsets, classes, draft)
+        n_bins, n_occurrences = draft[0].bin_, draft[0].occurrence
+        fits = fits and offsets[n_bins] < events.shape[1] and n_occurrences <= parts.shape[1]
+        if fits:
+            _store(events, i, shift, n_bins, channels, offsets)
+            for k in range(n_occurrences):
+                parts[i, k] = (onsets[k] << 32) + classes[k]
+            s = state[i]
+            s.n_occurrences, s.label = n_occurrences, draft[0].label
+            s.occurrence, s.given = 0, 0.0
+            emitted[i] = 0
+            bins[i], cursors[i], deadlines[i] = 0, 0, limit
+            n += 1
+            is_new = True
+    return n
+
+
+@compiled
+def _make_room(crowd: Any) -> None:
+    """Room for what is drawn, or for the one trial that is drawn, where there was too little."""
+    draft, offsets = crowd.draft[0], crowd.offsets
+    crowd.channels, crowd.offsets, crowd.onsets, crowd.classes = longer_buffers(
+        crowd.world, crowd.channels, offsets, crowd.onsets, crowd.classes, crowd.draft
+    )
+    crowd.events = _widened(crowd.events, draft.n_events + 1)
+    crowd.parts = _widened(crowd.parts, draft.occurrence)
 
 
 @compiled
 def step_trials(
     crowd: Any,
     actions: NDArray[Any],
-    rewards: NDArray[np.float64],
-    terminated: NDArray[np.bool_],
-    truncated: NDArray[np.bool_],
-    labels: NDArray[np.int64],
-    outputs: NDArray[Any],
-    report: NDArray[np.int64],
-) -> tuple[int, int, int, NDArray[np.int64]]:
-    """One step of every environment.
-
-    Writes into `rewards`, `terminated` and `truncated`, which are zero, and for environments whose
-    trial has come to its end into `labels` and `outputs`, and into `report`: i, K, then the K
-    onsets, classes and targets.
+) -> tuple[int, int, int, bool]:
+    """One step of every environment: writes the `results` and, of trials that ended, the `report`.
 
     Returns the number of the first environment with a bad action (−1: none; else nothing has been
-    done), the number of environments now over, and the length of the report and the report.
+    done), the number of environments now over, the number of trials that ended, and whether the
+    report is a new array, since the old one was too short.
     """
     bad = _first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
     if bad >= 0:
-        return bad, crowd.n_over, 0, report
+        return bad, crowd.n_over, 0, False
+    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
+    report, room, heads = crowd.report, crowd.report.size, crowd.heads
+    for k in range(crowd.n_told):
+        i = heads[k, 0]
+        rewards[i], terminated[i], labels[i], outputs[i], pattern_bins[i] = 0.0, False, 0, 0, 0
+    _zero(truncated)
     _clear(crowd)
     clock, over, looks, emitted = crowd.clock, crowd.over, crowd.looks, crowd.emitted
     bins, due, deadlines = clock[0], clock[1], clock[3]
@@ -355,7 +420,7 @@ def step_trials(
         looks[n_looks] = i
         n_looks += bins[i] == due[i]
     n_over = _show(crowd, n_looks)
-    length = 0
+    n_told = end = 0
     for k in range(n_over):
         i = crowd.ended[k]
         over[k] = i
@@ -363,21 +428,36 @@ def step_trials(
         if _is_used_up(crowd, i):
             s = crowd.state[i]
             terminated[i] = True
-            labels[i], outputs[i] = s.label, emitted[i]
+            labels[i], outputs[i], pattern_bins[i] = s.label, emitted[i], crowd.world.pattern_bins
             if crowd.feedback != DENSE:
                 rewards[i] = compiled_reward_for(
                     s.label - emitted[i], crowd.tolerance, crowd.feedback == SIGN
                 )
-            report, length = _reported(
-                report, length, i, crowd.parts[i, : s.n_occurrences], crowd.world.targets
-            )
-    crowd.n_over = n_over
+            report = _reported(
+                report, heads[n_told], end, i, crowd.parts[i, : s.n_occurrences],
+                crowd.world.targets,
+            )  # fmt: skip
+            end = heads[n_told, 4]
+            n_told += 1
+    crowd.n_over, crowd.n_told, crowd.report = n_over, n_told, report
 
     if crowd.autoreset == SAME_STEP:
         _set_aside(crowd)
         begin_trials(crowd, over[:n_over])
         crowd.n_over = 0
-    return -1, n_over, length, report
+    return -1, n_over, n_told, report.size > room
+
+
+@compiled
+def report_of(crowd: Any) -> NDArray[np.int64]:
+    """The report of the trials that the last step ended."""
+    return crowd.report
+
+
+@compiled
+def _zero(array: NDArray[Any]) -> None:
+    for i in range(array.size):
+        array[i] = 0
 
 
 @compiled
@@ -411,28 +491,28 @@ def _dense_reward(
 @compiled
 def _reported(
     report: NDArray[np.int64],
-    length: int,
+    head: NDArray[np.int64],
+    first: int,
     i: int,
     occurrences: NDArray[np.int64],
     targets: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], int]:
-    """The report with the occurrences of environment `i` at its end, and its new length."""
+) -> NDArray[np.int64]:
+    """The report with the occurrences of environment `i` from `first` on; `head` says where."""
     n = occurrences.size
-    end = length + 2 + 3 * n
-    if end > report.size:
-        longer = np.empty(2 * end, np.int64)
-        for j in range(length):
+    if first + 3 * n > report.size:
+        longer = np.empty(2 * (first + 3 * n), np.int64)
+        for j in range(first):
             longer[j] = report[j]
         report = longer
-    report[length] = i
-    report[length + 1] = n
-    at = length + 2
     for k in range(n):
         class_ = occurrences[k] & 0xFFFFFFFF
-        report[at + k] = occurrences[k] >> 32
-        report[at + n + k] = class_
-        report[at + 2 * n + k] = targets[class_]
-    return report, end
+        report[first + k] = occurrences[k] >> 32
+        report[first + n + k] = class_
+        report[first + 2 * n + k] = targets[class_]
+    head[0] = i
+    for part in range(4):
+        head[1 + part] = first + part * n
+    return report
 
 
 @compiled
@@ -444,8 +524,7 @@ def _go_on(crowd: Any, which: NDArray[Any], begin: bool) -> None:
     """
     if which.size == 0:
         return
-    channels, offsets = np.empty(1_024, np.int32), np.empty(1_024, np.int64)
-    offsets[0] = 0
+    channels, offsets = crowd.channels, crowd.offsets
     held, world, state = crowd.held, crowd.world, crowd.state
     events, shift = crowd.events, crowd.shift
     bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
@@ -462,14 +541,14 @@ def _go_on(crowd: Any, which: NDArray[Any], begin: bool) -> None:
             s.n_bins = s.n_noise + (world.pattern_bins if s.class_ >= 0 else 0)
             if offsets[s.n_bins] >= events.shape[1]:
                 events = _widened(events, offsets[s.n_bins] + 1)
-            _store(events[i], shift, s.n_bins, channels, offsets)
+            _store(events, i, shift, s.n_bins, channels, offsets)
             if crowd.limit < NO_LIMIT:
                 deadlines[i] -= bins[i]
             bins[i], cursors[i] = 0, 0
         s.count = 0
         if begin:
             deadlines[i] = bins[i] + crowd.limit
-    crowd.events = events
+    crowd.events, crowd.channels, crowd.offsets = events, channels, offsets
     _show_first(crowd, which)
 
 
@@ -483,20 +562,16 @@ def begin_streams(crowd: Any, which: NDArray[np.int64]) -> None:
 def step_streams(
     crowd: Any,
     actions: NDArray[np.int64],
-    rewards: NDArray[np.float64],
-    terminated: NDArray[np.bool_],
-    truncated: NDArray[np.bool_],
-    mistakes: NDArray[np.int64],
-    classes: NDArray[np.int64],
 ) -> tuple[int, int]:
-    """One step of every environment; arguments and result as in `step_trials`.
-
-    For environments that made a mistake writes its number into `mistakes` and its class into
-    `classes`.
-    """
+    """One step of every environment: writes the `results`; returns as `step_trials` does."""
     bad = _first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
     if bad >= 0:
         return bad, crowd.n_over
+    rewards, terminated, truncated, mistakes, classes = crowd.results
+    _zero(terminated)
+    _zero(truncated)
+    _zero(mistakes)
+    _zero(classes)
     _clear(crowd)
     clock, over, looks = crowd.clock, crowd.over, crowd.looks
     bins, due, deadlines = clock[0], clock[1], clock[3]
