@@ -218,8 +218,8 @@ def _show(crowd: Any, n: int) -> int:
     Notes for each when to look again. Puts those that are at the end of what was drawn, or at their
     deadline, into `ended`; returns their number. `looks` is used up.
 
-    All rows show one spike, then those that have another the next, and so on: how many spikes a bin
-    has is a coin toss, and a branch on it would cost more than all the rest.
+    All rows show one spike, then those that have another show the next, and so on: no branch
+    depends on how many spikes a bin has.
     """
     bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
     events, shift, looks, ended = crowd.events, crowd.shift, crowd.looks, crowd.ended

@@ -41,7 +41,7 @@ MATCHED = {1: 1_600_000, 2: 8_000_000}
 
 PARTS = ("neurons", "rl")
 RUN: dict[str, Any] = {"runs": 100, "cap": 10_000}
-SEEDS = {"quick": (3, 1), "full": (10, 10)}
+SEEDS = {"quick": (3, 1), "full": (10, 5)}
 """Number of pattern seeds of the neurons, and of the RL agents."""
 CLASSES = {"quick": (1,), "full": (1, 2)}
 FIRST_SEED = 100
