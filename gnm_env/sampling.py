@@ -40,28 +40,6 @@ def grown(buffer: NDArray[Any], needed: int) -> NDArray[Any]:
 
 
 @compiled
-def append_noise(
-    rng: Generator,
-    world: World,
-    n_bins: int,
-    channels: NDArray[np.int32],
-    offsets: NDArray[np.int64],
-    bin_: int,
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Append `n_bins` bins of noise, the first of them bin `bin_`. Each bit is Bernoulli(p)."""
-    offsets = grown(offsets, bin_ + n_bins + 1)
-    position, n_events, done = _fill_noise(
-        rng, world, n_bins, channels, offsets, bin_, -1, offsets[bin_]
-    )
-    while not done:
-        channels = grown(channels, channels.size + 1)
-        position, n_events, done = _fill_noise(
-            rng, world, n_bins, channels, offsets, bin_, position, n_events
-        )
-    return channels, offsets
-
-
-@compiled
 def _fill_noise(
     rng: Generator,
     world: World,
@@ -110,16 +88,26 @@ def _accumulate(offsets: NDArray[np.int64], bin_: int, n_bins: int) -> None:
 
 
 @compiled
-def _is_noisy(world: World) -> bool:
-    """Whether occurrences differ from their pattern."""
-    return world.jitter_bins > 0 or world.deletion > 0.0
-
-
-@compiled
 def _pattern_spikes(world: World, class_: int) -> int:
     """Number of spikes of pattern `class_`."""
     bins = world.pattern_bins
     return world.pattern_offsets[(class_ + 1) * bins] - world.pattern_offsets[class_ * bins]
+
+
+@inlined
+def _fill_occurrence(
+    rng: Generator,
+    world: World,
+    class_: int,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    bin_: int,
+) -> None:
+    """Put an occurrence of pattern `class_` at bin `bin_`; there is room."""
+    if world.jitter_bins > 0 or world.deletion > 0.0:
+        _fill_noisy_pattern(rng, world, class_, channels, offsets, bin_)
+    else:
+        _fill_pattern(world, class_, channels, offsets, bin_)
 
 
 @compiled
@@ -302,10 +290,7 @@ def fill_trial(
             if fits:
                 onsets[k] = t - d.first_bin
                 classes[k] = class_
-                if _is_noisy(world):
-                    _fill_noisy_pattern(rng, world, class_, channels, offsets, t)
-                else:
-                    _fill_pattern(world, class_, channels, offsets, t)
+                _fill_occurrence(rng, world, class_, channels, offsets, t)
                 t += world.pattern_bins
                 n_events = offsets[t]
                 k += 1
@@ -399,10 +384,7 @@ def append_piece(
         noise_left = -1.0
         class_ = int(rng.random() * world.n_classes)
         channels = grown(channels, n_events + _pattern_spikes(world, class_))
-        if _is_noisy(world):
-            _fill_noisy_pattern(rng, world, class_, channels, offsets, bin_ + n_noise)
-        else:
-            _fill_pattern(world, class_, channels, offsets, bin_ + n_noise)
+        _fill_occurrence(rng, world, class_, channels, offsets, bin_ + n_noise)
     return channels, offsets, n_noise, class_, noise_left
 
 

@@ -1,6 +1,6 @@
 """Names that the templates of this package use, and that `binding` binds for each combination.
 
-The values here only say what belongs there.
+The values here only say what belongs there; but WRONG_BEYOND holds wherever nobody binds it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ LEARN_WIDTH = 8
 """Neurons side by side in the learning step."""
 
 WRONG_BEYOND = 0.0
-"""A trial counts as wrong if its sum is further than this from the label; ½ for graded output."""
+"""A trial counts as wrong if its sum is further than this from the label; ½ for graded output, as
+`agents.continuous` binds it."""
 
 # Of the neuron.
 Parameters: Any = None

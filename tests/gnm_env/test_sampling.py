@@ -7,7 +7,6 @@ seed is fixed, so that it gives the same verdict each time.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +18,7 @@ from scipy import stats
 
 from gnm_env import Patterns, Task, draw_trial
 from gnm_env.compiled import compiled
-from gnm_env.sampling import append_noise, append_piece, append_trial, new_buffers
+from gnm_env.sampling import append_piece, append_trial, new_buffers
 from gnm_env.task import dense, world
 from tests.gnm_env import reference
 
@@ -152,12 +151,9 @@ def _poissons(rng: Generator, mean: float, n: int) -> Any:
 
 @functools.cache
 def some_noise(rate: float) -> tuple[Task, Any, Any]:
-    task, n_bins = Task(n_inputs=20, rate=rate), TestNoise.N_BINS
-    numbers = world(task, Patterns.draw(task, 0))
-    channels, offsets = append_noise(
-        np.random.default_rng(5), numbers, n_bins, *new_buffers()[:2], 0
-    )
-    return task, channels[: offsets[n_bins]], offsets[: n_bins + 1]
+    task = Task(n_inputs=20, rate=rate, background_bins=TestNoise.N_BINS, mean_occurrences=0.0)
+    trial = draw_trial(task, Patterns.draw(task, 0), np.random.default_rng(5))
+    return task, trial.channels, trial.offsets
 
 
 @pytest.mark.parametrize("rate", [0.005, 0.3])
@@ -306,17 +302,35 @@ class TestPatternNoise:
         assert n_occurrences > 0 and len(places) == 0
 
 
-def test_buffers_that_are_too_short_change_nothing() -> None:
-    task = Task(n_classes=2, mean_occurrences=8.0)
+@pytest.mark.parametrize("short", [(0,), (1,), (2,), (3,), (0, 1, 2, 3)])
+@pytest.mark.parametrize("noise", [{}, {"jitter_bins": 3, "deletion": 0.2}], ids=["plain", "noisy"])
+def test_buffers_that_are_too_short_change_nothing(
+    noise: dict[str, Any], short: tuple[int, ...]
+) -> None:
+    """Nor does what stands before the trial: one here, as long as the buffers may be."""
+    task = Task(n_classes=2, mean_occurrences=8.0, **noise)
     patterns = Patterns.draw(task, 0)
-    tiny: Callable[[], tuple[Any, ...]] = lambda: (  # noqa: E731
-        np.empty(1, np.int32), np.zeros(1, np.int64), np.empty(1, np.int64), np.empty(1, np.int64)
-    )  # fmt: skip
-    for seed in range(5):
-        trial = draw_trial(task, patterns, np.random.default_rng(seed))
-        channels, offsets, onsets, classes, n_bins, k, _ = append_trial(
-            np.random.default_rng(seed), world(task, patterns), *tiny(), 0, 0
+    for seed in range(10):
+        rng, single = np.random.default_rng(seed), np.random.default_rng(seed)
+        before, trial = (draw_trial(task, patterns, single) for _ in range(2))
+        buffers = [
+            before.channels.copy(), before.offsets.copy(), before.onsets.copy(),
+            before.classes.copy(),
+        ]  # fmt: skip
+        for k in {0, 1, 2, 3} - set(short):
+            buffers[k] = np.concatenate([buffers[k], np.zeros(10_000, buffers[k].dtype)])
+        draw_trial(task, patterns, rng)
+        first_bin, first = before.n_bins, len(before.onsets)
+        *buffers, end_bin, end, label = append_trial(
+            rng, world(task, patterns), *buffers, first_bin, first
         )
-        assert channels[: offsets[n_bins]].tolist() == trial.channels.tolist()
-        assert onsets[:k].tolist() == trial.onsets.tolist()
-        assert classes[:k].tolist() == trial.classes.tolist()
+        channels, offsets, onsets, classes = buffers
+        relative = offsets[first_bin : end_bin + 1] - offsets[first_bin]
+        assert relative.tolist() == trial.offsets.tolist()
+        n_before, n_events = offsets[first_bin], offsets[end_bin]
+        assert channels[:n_before].tolist() == before.channels.tolist()
+        assert channels[n_before:n_events].tolist() == trial.channels.tolist()
+        assert onsets[first:end].tolist() == trial.onsets.tolist()
+        assert classes[first:end].tolist() == trial.classes.tolist()
+        assert label == trial.label
+        assert rng.bit_generator.state == single.bit_generator.state
