@@ -16,7 +16,7 @@ from numpy.random import Generator
 from agents.history import BLOCK, Callback, History
 from agents.lane_group import LaneGroup
 from agents.loop import warn_of_overflow
-from agents.memory import require
+from agents.memory import require_memory
 from agents.neuron_lanes import LANES_PER_BLOCK
 from gnm_env.checks import whole
 from gnm_env.task import Patterns, Task
@@ -145,7 +145,7 @@ def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: 
                 f"agents must be agents, such as NeuronAgent makes, got {agent!r} as agent {place}"
             )
     n_weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
-    require(n_weights, len(agents), task, threads)
+    require_memory(n_weights, len(agents), task, threads)
     kinds: dict[Hashable, list[int]] = defaultdict(list)
     for place, agent in enumerate(agents):
         kinds[agent.group_key()].append(place)

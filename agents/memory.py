@@ -50,7 +50,7 @@ def bytes_there() -> float | None:
         return there
 
 
-def require(n_weights: int, n_agents: int, task: Task, threads: int) -> None:
+def require_memory(n_weights: int, n_agents: int, task: Task, threads: int) -> None:
     """ValueError if agents with all that they need exceed the memory that is there."""
     needed, there = bytes_needed(n_weights, n_agents, task, threads), bytes_there()
     if there is not None and needed > there:

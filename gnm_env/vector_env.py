@@ -83,6 +83,9 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     bool array that tells where it holds (one for all keys, read-only). Lists are in object arrays.
     """
 
+    _results: Any
+    """TrialResults or StreamResults of the last step."""
+
     def __init__(
         self,
         num_envs: int,
@@ -129,7 +132,6 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self,
         state: NDArray[Any],
         emitted: NDArray[Any],
-        results: TrialResults | StreamResults,
         most: float,
         feedback: int = COST,
         tolerance: float = 0.0,
@@ -148,7 +150,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             self._observations,
             self._over,
             self._finals,
-            results,
+            self._results,
             self._heads,
         )
 
@@ -277,7 +279,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
         """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
         checked = np.asarray(actions)
-        if checked.shape != self._over.shape or checked.dtype.kind not in "iub":
+        if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
             raise ValueError(
                 f"actions must be whole numbers of shape ({self.num_envs},), one per environment, "
                 f"got {checked.dtype} of shape {checked.shape}"
@@ -288,6 +290,17 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         return ValueError(
             f"action must be 0 (silent) or 1 (spike), got {np.asarray(actions)[bad]!r} "
             f"for environment {bad}"
+        )
+
+    def _stepped(self, info: dict[str, Any]) -> Step:
+        """What `step` returns: copies, since the next step writes to the same results."""
+        results = self._results
+        return (
+            self._seen(),
+            results.rewards.copy(),
+            results.terminated.copy(),
+            results.truncated.copy(),
+            info,
         )
 
     def _info(self, terminal: dict[str, Any]) -> dict[str, Any]:
@@ -374,7 +387,6 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             self._crowd = self._new_crowd(
                 np.zeros(self.num_envs, TRIAL_STATE),
                 self._emitted,
-                self._results,
                 self.max_output if self._graded else 1.0,
                 FEEDBACK_NUMBER[self.feedback],
                 self.tolerance,
@@ -390,17 +402,10 @@ class PatternTrialVectorEnv(PatternVectorEnv):
             raise self._no_amount(actions, bad) if self._graded else self._no_spike(actions, bad)
         if is_new:
             self._report = report_of(self._crowd)
-        results = self._results
         info: dict[str, Any] = {}
         if self._n_over:
             info = self._info(self._terminal_info(n_told))
-        return (
-            self._seen(),
-            results.rewards.copy(),
-            results.terminated.copy(),
-            results.truncated.copy(),
-            info,
-        )
+        return self._stepped(info)
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
@@ -499,9 +504,7 @@ class PatternStreamVectorEnv(PatternVectorEnv):
 
     def _begin(self, which: NDArray[np.int64]) -> None:
         if self._crowd is None:
-            self._crowd = self._new_crowd(
-                self._state, np.zeros(0, np.int64), self._results, most=1.0
-            )
+            self._crowd = self._new_crowd(self._state, np.zeros(0, np.int64), most=1.0)
         begin_streams(self._crowd, which)
 
     def step(self, actions: NDArray[Any]) -> Step:
@@ -509,17 +512,10 @@ class PatternStreamVectorEnv(PatternVectorEnv):
         bad, self._n_over = step_streams(self._crowd, self._spikes(actions))
         if bad >= 0:
             raise self._no_spike(actions, bad)
-        results = self._results
         info: dict[str, Any] = {}
         if self._n_over:
             info = self._info(self._terminal_info())
-        return (
-            self._seen(),
-            results.rewards.copy(),
-            results.terminated.copy(),
-            results.truncated.copy(),
-            info,
-        )
+        return self._stepped(info)
 
     def _terminal_info(self) -> dict[str, Any]:
         """The info of streams that a mistake has ended, from the results."""

@@ -256,6 +256,17 @@ def _show(crowd: Any, n: int) -> int:
 
 
 @compiled
+def _show_due(crowd: Any) -> int:
+    """`_show` for all rows that need a look in the present bin."""
+    bins, due, looks = crowd.clock[0], crowd.clock[1], crowd.looks
+    n = 0
+    for i in range(looks.size):
+        looks[n] = i
+        n += bins[i] == due[i]
+    return _show(crowd, n)
+
+
+@compiled
 def _show_first(crowd: Any, which: NDArray[Any]) -> None:
     """Show the spikes of the bin at which each environment in `which` begins."""
     for k in range(which.size):
@@ -393,15 +404,10 @@ def step_trials(
     bad = _first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
     if bad >= 0:
         return bad, crowd.n_over, 0, False
-    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
-    report, room, heads = crowd.report, crowd.report.size, crowd.heads
-    for k in range(crowd.n_told):
-        i = heads[k, 0]
-        rewards[i], terminated[i], labels[i], outputs[i], pattern_bins[i] = 0.0, False, 0, 0, 0
-    _zero(truncated)
+    _forget(crowd)
     _clear(crowd)
-    clock, over, looks, emitted = crowd.clock, crowd.over, crowd.looks, crowd.emitted
-    bins, due, deadlines = clock[0], clock[1], clock[3]
+    over, emitted, rewards = crowd.over, crowd.emitted, crowd.results.rewards
+    bins = crowd.clock[0]
     if crowd.feedback == DENSE:
         for i in range(actions.size):
             rewards[i] = _dense_reward(
@@ -415,23 +421,44 @@ def step_trials(
     if crowd.autoreset == NEXT_STEP:
         begin_trials(crowd, over[: crowd.n_over])
 
-    n_looks = 0
-    for i in range(actions.size):
-        looks[n_looks] = i
-        n_looks += bins[i] == due[i]
-    n_over = _show(crowd, n_looks)
-    n_told = end = 0
+    n_over = _show_due(crowd)
     for k in range(n_over):
-        i = crowd.ended[k]
-        over[k] = i
+        over[k] = crowd.ended[k]
+    crowd.n_over = n_over
+    is_new = _tell(crowd)
+    if crowd.autoreset == SAME_STEP:
+        _set_aside(crowd)
+        begin_trials(crowd, over[:n_over])
+        crowd.n_over = 0
+    return -1, n_over, crowd.n_told, is_new
+
+
+@compiled
+def _forget(crowd: Any) -> None:
+    """Clear the results of the trials that the last step ended."""
+    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
+    for k in range(crowd.n_told):
+        i = crowd.heads[k, 0]
+        rewards[i], terminated[i], labels[i], outputs[i], pattern_bins[i] = 0.0, False, 0, 0, 0
+    _zero(truncated)
+
+
+@compiled
+def _tell(crowd: Any) -> bool:
+    """Write results and report of the environments that are over; whether the report is new."""
+    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
+    report, room, heads = crowd.report, crowd.report.size, crowd.heads
+    bins, deadlines = crowd.clock[0], crowd.clock[3]
+    n_told = end = 0
+    for i in crowd.over[: crowd.n_over]:
         truncated[i] = bins[i] == deadlines[i]
         if _is_used_up(crowd, i):
-            s = crowd.state[i]
+            s, output = crowd.state[i], crowd.emitted[i]
             terminated[i] = True
-            labels[i], outputs[i], pattern_bins[i] = s.label, emitted[i], crowd.world.pattern_bins
+            labels[i], outputs[i], pattern_bins[i] = s.label, output, crowd.world.pattern_bins
             if crowd.feedback != DENSE:
                 rewards[i] = compiled_reward_for(
-                    s.label - emitted[i], crowd.tolerance, crowd.feedback == SIGN
+                    s.label - output, crowd.tolerance, crowd.feedback == SIGN
                 )
             report = _reported(
                 report, heads[n_told], end, i, crowd.parts[i, : s.n_occurrences],
@@ -439,13 +466,8 @@ def step_trials(
             )  # fmt: skip
             end = heads[n_told, 4]
             n_told += 1
-    crowd.n_over, crowd.n_told, crowd.report = n_over, n_told, report
-
-    if crowd.autoreset == SAME_STEP:
-        _set_aside(crowd)
-        begin_trials(crowd, over[:n_over])
-        crowd.n_over = 0
-    return -1, n_over, n_told, report.size > room
+    crowd.n_told, crowd.report = n_told, report
+    return report.size > room
 
 
 @compiled
@@ -573,8 +595,7 @@ def step_streams(
     _zero(mistakes)
     _zero(classes)
     _clear(crowd)
-    clock, over, looks = crowd.clock, crowd.over, crowd.looks
-    bins, due, deadlines = clock[0], clock[1], clock[3]
+    over, bins = crowd.over, crowd.clock[0]
     for i in range(actions.size):
         rewards[i] = 1.0
     if crowd.autoreset == NEXT_STEP:
@@ -585,11 +606,26 @@ def step_streams(
     for i in range(actions.size):
         bins[i] += 1
 
-    n_looks = 0
-    for i in range(actions.size):
-        looks[n_looks] = i
-        n_looks += bins[i] == due[i]
-    _show(crowd, n_looks)
+    _show_due(crowd)
+    n_used_up = _judge(crowd, actions)
+    _go_on(crowd, crowd.looks[:n_used_up], False)
+    n_over = crowd.n_over
+    if crowd.autoreset == SAME_STEP:
+        _set_aside(crowd)
+        _go_on(crowd, over[:n_over], True)
+        crowd.n_over = 0
+    return -1, n_over
+
+
+@compiled
+def _judge(crowd: Any, actions: NDArray[np.int64]) -> int:
+    """Judge the answers to the last bin, and write the results of streams that are over.
+
+    Returns the number of streams whose piece is used up; they stand at the beginning of `looks`.
+    """
+    rewards, terminated, truncated, mistakes, classes = crowd.results
+    over, looks = crowd.over, crowd.looks
+    bins, due, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[3]
     # Only those at an end are still due.
     n_looks = 0
     for i in range(actions.size):
@@ -612,13 +648,7 @@ def step_streams(
             looks[n_used_up] = i  # in the place of one that has been looked at
             n_used_up += 1
     crowd.n_over = n_over
-
-    _go_on(crowd, looks[:n_used_up], False)
-    if crowd.autoreset == SAME_STEP:
-        _set_aside(crowd)
-        _go_on(crowd, over[:n_over], True)
-        crowd.n_over = 0
-    return -1, n_over
+    return n_used_up
 
 
 @compiled

@@ -20,6 +20,14 @@ def test_specialise_binds_names_of_the_template() -> None:
     assert compiled(template)(2.0) == 4.0
 
 
+def printed(code: str, folder: Path) -> tuple[str, ...]:
+    """The words that the code prints in a process of its own, run in `folder`."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return tuple(done.stdout.split())
+
+
 def test_an_edit_to_a_called_function_in_another_file_is_noticed(tmp_path: Path) -> None:
     package = tmp_path / "growing"
     package.mkdir()
@@ -44,10 +52,7 @@ def test_an_edit_to_a_called_function_in_another_file_is_noticed(tmp_path: Path)
             "from growing.outer import outer\n"
             "print(outer(10), sum(outer.stats.cache_hits.values()))"
         )
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        return tuple(done.stdout.split())
+        return printed(code, tmp_path)
 
     assert answer(1) == ("12", "0")
     assert answer(1) == ("12", "1")
@@ -73,10 +78,7 @@ def test_an_edit_to_a_bound_function_of_another_package_is_noticed(tmp_path: Pat
             "bound = specialise(templates.template, 'mine', step=mine.step)\n"
             "print(bound(10), sum(bound.stats.cache_hits.values()))"
         )
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        return tuple(done.stdout.split())
+        return printed(code, tmp_path)
 
     assert answer(1) == ("12", "0")
     assert answer(1) == ("12", "1")
@@ -92,7 +94,4 @@ def test_a_bound_function_that_was_typed_in_needs_no_file(tmp_path: Path) -> Non
         "step = njit(lambda x: x + 1)\n"
         "print(specialise(templates.template, 'typed', step=step)(10))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "12"
+    assert printed(code, tmp_path) == ("12",)
