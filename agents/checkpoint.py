@@ -20,7 +20,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.task import Patterns, Task, world
+from gnm_env.task import Patterns, Task, task_arrays
 
 FORMAT = 1
 _HEADER = "header"
@@ -170,7 +170,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
             bits = np.unpackbits(arrays.pop("patterns"), count=int(np.prod(shape)))
             patterns = Patterns.from_dense(bits.reshape(shape))
         if task is not None and patterns is not None:
-            world(task, patterns)  # they must fit each other
+            task_arrays(task, patterns)  # they must fit each other
         agent = _KINDS[kind].from_checkpoint(header, arrays)  # type: ignore[attr-defined]
         return Checkpoint(agent, task, patterns, _generator(header.get("rng")))
     except (LookupError, TypeError, ValueError, OverflowError) as error:

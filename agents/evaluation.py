@@ -14,7 +14,7 @@ from agents.lane_group import Answers
 from agents.many import lane_groups, thread_count
 from agents.policy import as_agent
 from gnm_env.checks import whole
-from gnm_env.stream_env import MAX_EPISODE_BINS
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import Patterns, Task
 
 
@@ -22,7 +22,7 @@ def noisy_performance(
     agent: Any | Sequence[Any],
     task: Task,
     patterns: Patterns,
-    runs: int = 100,
+    runs: int = RUNS,
     cap: int = MAX_EPISODE_BINS,
     seed: int = 0,
     *,

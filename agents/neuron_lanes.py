@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.kernels import kernels
 from agents.lane_group import Answers
-from gnm_env.task import Patterns, Task, world
+from gnm_env.task import Patterns, Task, task_arrays
 
 if TYPE_CHECKING:
     from agents.neuron_agent import NeuronAgent
@@ -33,7 +33,7 @@ class NeuronLanes:
 
     def __init__(self, agents: Sequence[NeuronAgent], task: Task, patterns: Patterns) -> None:
         self._agents = list(agents)
-        self._world = world(task, patterns)
+        self._task_arrays = task_arrays(task, patterns)
         first = self._agents[0]
         for agent in self._agents:
             if agent.n_inputs != task.n_inputs:
@@ -69,7 +69,7 @@ class NeuronLanes:
 
     def train(self, rng: Generator, trials: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         wrong, absolute = self._kernels.train(
-            rng, self._world, trials, self._mode, self._rule_mode, self._parameters,
+            rng, self._task_arrays, trials, self._mode, self._rule_mode, self._parameters,
             self._rule_parameters, self._weights, self._previous, self._overflow, self._trials,
         )  # fmt: skip
         self._trials += trials
@@ -77,13 +77,13 @@ class NeuronLanes:
 
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
         bins = self._kernels.survive(
-            rng, self._world, cap, self._mode, self._parameters, self._weights
+            rng, self._task_arrays, cap, self._mode, self._parameters, self._weights
         )
         return self._per_agent(bins).astype(np.int64)
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         table, false_alarms, wrong, noise_bins = self._kernels.answer(
-            rng, self._world, trials, self._mode, self._parameters, self._weights
+            rng, self._task_arrays, trials, self._mode, self._parameters, self._weights
         )
         return Answers(
             table.reshape(-1, *table.shape[2:])[: len(self._agents)],

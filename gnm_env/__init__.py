@@ -5,7 +5,8 @@ Importing this package registers `gnm/PatternTrial-v0` and `gnm/PatternStream-v0
 
 from gymnasium.envs.registration import register
 
-from gnm_env.stream_env import MAX_EPISODE_BINS, PatternStreamEnv
+from gnm_env.rules import MAX_EPISODE_BINS
+from gnm_env.stream_env import PatternStreamEnv
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 from gnm_env.trial_env import PatternTrialEnv

@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from gnm_env.generators import Generators
-from gnm_env.task import Patterns, Task, world
+from gnm_env.task import Patterns, Task, task_arrays
 
 
 class PatternEnv(gym.Env[NDArray[np.int8], Any]):
@@ -30,7 +30,7 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
     ) -> None:
         self.task = Task.from_keywords(task, task_fields)
         self.patterns = Patterns.draw(self.task, pattern_seed) if patterns is None else patterns
-        self._world = world(self.task, self.patterns)
+        self._task_arrays = task_arrays(self.task, self.patterns)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
         self.render_mode = render_mode

@@ -21,7 +21,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled, inlined
-from gnm_env.task import World
+from gnm_env.task import TaskArrays
 
 PIECE_BINS = 2_048
 """Most noise bins in one piece of the endless stream, so that memory stays bounded as q -> 0."""
@@ -42,7 +42,7 @@ def grown(buffer: NDArray[Any], needed: int) -> NDArray[Any]:
 @compiled
 def _fill_noise(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     n_bins: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
@@ -59,18 +59,18 @@ def _fill_noise(
     if position < 0:
         for t in range(bin_, bin_ + n_bins):
             offsets[t + 1] = 0
-    n_inputs = np.uint64(world.n_inputs)
-    n_bits = n_bins * world.n_inputs
+    n_inputs = np.uint64(task.n_inputs)
+    n_bits = n_bins * task.n_inputs
     done = False
     while n_events < channels.size and not done:
-        gap = rng.standard_exponential() / world.hazard
+        gap = rng.standard_exponential() / task.hazard
         # Written so that infinity and NaN (p = 0) end the noise as well.
         done = not gap < n_bits - position - 1
         if not done:
             position += 1 + int(gap)
             # Unsigned: a signed division that rounds down costs three times as much.
             noise_bin = np.int64(np.uint64(position) // n_inputs)
-            channels[np.uint64(n_events)] = position - noise_bin * world.n_inputs
+            channels[np.uint64(n_events)] = position - noise_bin * task.n_inputs
             offsets[np.uint64(bin_ + noise_bin + 1)] += 1
             n_events += 1
     if done:
@@ -88,53 +88,53 @@ def _accumulate(offsets: NDArray[np.int64], bin_: int, n_bins: int) -> None:
 
 
 @compiled
-def _pattern_spikes(world: World, class_: int) -> int:
+def _pattern_spikes(task: TaskArrays, class_: int) -> int:
     """Number of spikes of pattern `class_`."""
-    bins = world.pattern_bins
-    return world.pattern_offsets[(class_ + 1) * bins] - world.pattern_offsets[class_ * bins]
+    bins = task.pattern_bins
+    return task.pattern_offsets[(class_ + 1) * bins] - task.pattern_offsets[class_ * bins]
 
 
 @inlined
 def _fill_occurrence(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     class_: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
     """Put an occurrence of pattern `class_` at bin `bin_`; there is room."""
-    if world.jitter_bins > 0 or world.deletion > 0.0:
-        _fill_noisy_pattern(rng, world, class_, channels, offsets, bin_)
+    if task.jitter_bins > 0 or task.deletion > 0.0:
+        _fill_noisy_pattern(rng, task, class_, channels, offsets, bin_)
     else:
-        _fill_pattern(world, class_, channels, offsets, bin_)
+        _fill_pattern(task, class_, channels, offsets, bin_)
 
 
 @compiled
 def _fill_pattern(
-    world: World,
+    task: TaskArrays,
     class_: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
     """Put an occurrence of pattern `class_` at bin `bin_`, without noise on it; there is room."""
-    bins = world.pattern_bins
-    first = world.pattern_offsets[class_ * bins]
-    last = world.pattern_offsets[(class_ + 1) * bins]
+    bins = task.pattern_bins
+    first = task.pattern_offsets[class_ * bins]
+    last = task.pattern_offsets[(class_ + 1) * bins]
     n_events = offsets[bin_]
     for e in range(first, last):
-        channels[np.uint64(n_events + e - first)] = world.pattern_channels[np.uint64(e)]
+        channels[np.uint64(n_events + e - first)] = task.pattern_channels[np.uint64(e)]
     for m in range(1, bins + 1):
         offsets[np.uint64(bin_ + m)] = (
-            n_events + world.pattern_offsets[np.uint64(class_ * bins + m)] - first
+            n_events + task.pattern_offsets[np.uint64(class_ * bins + m)] - first
         )
 
 
 @compiled
 def _fill_noisy_pattern(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     class_: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
@@ -142,39 +142,39 @@ def _fill_noisy_pattern(
 ) -> None:
     """Put an occurrence of pattern `class_` at bin `bin_`, with noise on it; there is room."""
     n_events = offsets[bin_]
-    cells = _noisy_cells(rng, world, class_)
-    for m in range(1, world.pattern_bins + 1):
+    cells = _noisy_cells(rng, task, class_)
+    for m in range(1, task.pattern_bins + 1):
         offsets[bin_ + m] = 0
     for k in range(cells.size):
         # Two spikes moved onto one cell are one spike: the raster stays binary.
         if k > 0 and cells[k] == cells[k - 1]:
             continue
-        m = cells[k] // world.n_inputs
-        channels[n_events] = cells[k] - m * world.n_inputs
+        m = cells[k] // task.n_inputs
+        channels[n_events] = cells[k] - m * task.n_inputs
         n_events += 1
         offsets[bin_ + m + 1] += 1
-    _accumulate(offsets, bin_, world.pattern_bins)
+    _accumulate(offsets, bin_, task.pattern_bins)
 
 
 @compiled
-def _noisy_cells(rng: Generator, world: World, class_: int) -> NDArray[np.int64]:
+def _noisy_cells(rng: Generator, task: TaskArrays, class_: int) -> NDArray[np.int64]:
     """Cells m·N + channel of the pattern's spikes after deletion and jitter, ascending."""
-    bins = world.pattern_bins
-    first = world.pattern_offsets[class_ * bins]
-    last = world.pattern_offsets[(class_ + 1) * bins]
+    bins = task.pattern_bins
+    first = task.pattern_offsets[class_ * bins]
+    last = task.pattern_offsets[(class_ + 1) * bins]
     cells = np.empty(last - first, np.int64)
     kept = 0
     for m in range(bins):
         for e in range(
-            world.pattern_offsets[class_ * bins + m], world.pattern_offsets[class_ * bins + m + 1]
+            task.pattern_offsets[class_ * bins + m], task.pattern_offsets[class_ * bins + m + 1]
         ):
-            if world.deletion > 0.0 and rng.random() < world.deletion:
+            if task.deletion > 0.0 and rng.random() < task.deletion:
                 continue
             moved = m
-            if world.jitter_bins > 0:
-                moved += int(rng.random() * (2 * world.jitter_bins + 1)) - world.jitter_bins
+            if task.jitter_bins > 0:
+                moved += int(rng.random() * (2 * task.jitter_bins + 1)) - task.jitter_bins
                 moved = min(max(moved, 0), bins - 1)
-            cells[kept] = moved * world.n_inputs + world.pattern_channels[e]
+            cells[kept] = moved * task.n_inputs + task.pattern_channels[e]
             kept += 1
     _sort(cells, 0, kept)
     return cells[:kept]
@@ -234,7 +234,7 @@ def begin_trial(
 @inlined
 def fill_trial(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     onsets: NDArray[np.int64],
@@ -249,34 +249,34 @@ def fill_trial(
     """
     d = draft[0]
     end, fits = d.end, True
-    while fits and d.class_ < world.n_classes:
+    while fits and d.class_ < task.n_classes:
         if d.count < 0:
-            d.count = rng.poisson(world.mean_occurrences)
-            d.label += d.count * world.targets[d.class_]
+            d.count = rng.poisson(task.mean_occurrences)
+            d.label += d.count * task.targets[d.class_]
         fits = end + d.count <= min(onsets.size, classes.size)
         if fits:
             # Where (background bin) and which (class), in one number: its order is the order in the
             # trial. The numbers wait in `onsets` until the trial is laid out.
             for k in range(end, end + d.count):
-                where = int(rng.random() * world.background_bins)
-                onsets[k] = where * world.n_classes + d.class_
+                where = int(rng.random() * task.background_bins)
+                onsets[k] = where * task.n_classes + d.class_
             end += d.count
             d.count = -1
             d.class_ += 1
-            if d.class_ == world.n_classes:
+            if d.class_ == task.n_classes:
                 _sort(onsets, d.first, end)
 
-    n_bins = world.background_bins + (end - d.first) * world.pattern_bins
+    n_bins = task.background_bins + (end - d.first) * task.pattern_bins
     fits = fits and d.first_bin + n_bins < offsets.size
     k, noise_done, position, t, n_events = (
         d.occurrence, d.noise_done, d.position, d.bin_, d.n_events
     )  # fmt: skip
     done = False
     while fits and not done:
-        before = onsets[k] // world.n_classes if k < end else world.background_bins
+        before = onsets[k] // task.n_classes if k < end else task.background_bins
         if before > noise_done:
             position, n_events, fits = _fill_noise(
-                rng, world, before - noise_done, channels, offsets, t, position, n_events
+                rng, task, before - noise_done, channels, offsets, t, position, n_events
             )
             if fits:
                 t += before - noise_done
@@ -285,13 +285,13 @@ def fill_trial(
         elif k == end:
             done = True
         else:
-            class_ = onsets[k] - before * world.n_classes
-            fits = n_events + _pattern_spikes(world, class_) <= channels.size
+            class_ = onsets[k] - before * task.n_classes
+            fits = n_events + _pattern_spikes(task, class_) <= channels.size
             if fits:
                 onsets[k] = t - d.first_bin
                 classes[k] = class_
-                _fill_occurrence(rng, world, class_, channels, offsets, t)
-                t += world.pattern_bins
+                _fill_occurrence(rng, task, class_, channels, offsets, t)
+                t += task.pattern_bins
                 n_events = offsets[t]
                 k += 1
     d.end, d.occurrence = end, k
@@ -301,7 +301,7 @@ def fill_trial(
 
 @compiled
 def longer_buffers(
-    world: World,
+    task: TaskArrays,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     onsets: NDArray[np.int64],
@@ -310,10 +310,10 @@ def longer_buffers(
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """The four buffers, with what they hold, long enough for `fill_trial` to get further."""
     d = draft[0]
-    n_bins = world.background_bins + (d.end - d.first) * world.pattern_bins
+    n_bins = task.background_bins + (d.end - d.first) * task.pattern_bins
     return (
         # A spike of noise, or any one pattern: no pattern has more spikes than all have together.
-        grown(channels, d.n_events + world.pattern_channels.size + 1),
+        grown(channels, d.n_events + task.pattern_channels.size + 1),
         grown(offsets, d.first_bin + n_bins + 1),
         grown(onsets, d.end + max(d.count, 0)),
         grown(classes, d.end + max(d.count, 0)),
@@ -323,7 +323,7 @@ def longer_buffers(
 @compiled
 def append_trial(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     onsets: NDArray[np.int64],
@@ -340,9 +340,9 @@ def append_trial(
     """
     draft = np.zeros(1, DRAFT)
     begin_trial(draft, offsets, bin_, occurrence)
-    while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
+    while not fill_trial(rng, task, channels, offsets, onsets, classes, draft):
         channels, offsets, onsets, classes = longer_buffers(
-            world, channels, offsets, onsets, classes, draft
+            task, channels, offsets, onsets, classes, draft
         )
     d = draft[0]
     return channels, offsets, onsets, classes, d.bin_, d.occurrence, d.label
@@ -351,7 +351,7 @@ def append_trial(
 @compiled
 def append_piece(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     noise_left: float,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
@@ -365,15 +365,15 @@ def append_piece(
     (−1: none yet) and the new `noise_left`.
     """
     if noise_left < 0:
-        noise_left = np.floor(rng.standard_exponential() / world.onset_hazard)
+        noise_left = np.floor(rng.standard_exponential() / task.onset_hazard)
         if not noise_left >= 0:  # 0 / 0: no pattern ever starts
             noise_left = np.inf
     n_noise = int(min(noise_left, float(PIECE_BINS)))
-    offsets = grown(offsets, bin_ + n_noise + world.pattern_bins + 1)
+    offsets = grown(offsets, bin_ + n_noise + task.pattern_bins + 1)
     position, n_events, done = -1, offsets[bin_], n_noise == 0
     while not done:
         position, n_events, done = _fill_noise(
-            rng, world, n_noise, channels, offsets, bin_, position, n_events
+            rng, task, n_noise, channels, offsets, bin_, position, n_events
         )
         if not done:
             channels = grown(channels, channels.size + 1)
@@ -382,9 +382,9 @@ def append_piece(
         noise_left -= PIECE_BINS
     else:
         noise_left = -1.0
-        class_ = int(rng.random() * world.n_classes)
-        channels = grown(channels, n_events + _pattern_spikes(world, class_))
-        _fill_occurrence(rng, world, class_, channels, offsets, bin_ + n_noise)
+        class_ = int(rng.random() * task.n_classes)
+        channels = grown(channels, n_events + _pattern_spikes(task, class_))
+        _fill_occurrence(rng, task, class_, channels, offsets, bin_ + n_noise)
     return channels, offsets, n_noise, class_, noise_left
 
 

@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled
 from gnm_env.pattern_env import PatternEnv, spike_from
+from gnm_env.rules import MISTAKES, mistake
 from gnm_env.sampling import append_piece, new_buffers
-from gnm_env.scoring import MISTAKES, mistake_in_pattern
-from gnm_env.task import Patterns, Task, World, dense
-
-MAX_EPISODE_BINS = 10_000
-"""Cap of the noisy performance, in bins: `max_episode_steps` of the registered environment."""
+from gnm_env.task import Patterns, Task, TaskArrays, dense
 
 
 class PatternStreamEnv(PatternEnv):
@@ -95,7 +92,7 @@ class PatternStreamEnv(PatternEnv):
 
     def _next_piece(self) -> None:
         channels, offsets, n_noise, self._class, self._noise_left = _next_piece(
-            self._generators().held, self._world, self._noise_left, *self._buffers
+            self._generators().held, self._task_arrays, self._noise_left, *self._buffers
         )
         self._buffers = channels, offsets
         self._pattern_bins = self.task.pattern_bins if self._class >= 0 else 0
@@ -130,7 +127,7 @@ class PatternStreamEnv(PatternEnv):
     def _mistake(self, spike: int) -> int:
         """Number of the mistake in answering a bin of an occurrence with `spike`; 0 if none."""
         self._count += spike
-        return mistake_in_pattern(self._count, self.task.owed[self._class], not self._ahead)
+        return mistake(self._count, self.task.owed[self._class], False, not self._ahead)
 
     def _show(self, spike: int) -> None:
         """Show the picture the bin shown last and the answer to it."""
@@ -141,9 +138,9 @@ class PatternStreamEnv(PatternEnv):
 @compiled
 def _next_piece(
     held: Any,
-    world: World,
+    task: TaskArrays,
     noise_left: float,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], int, int, float]:
-    return append_piece(held[0], world, noise_left, channels, offsets, 0)
+    return append_piece(held[0], task, noise_left, channels, offsets, 0)

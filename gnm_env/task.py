@@ -217,8 +217,8 @@ def _scatter(channels: NDArray[Any], offsets: NDArray[Any], raster: NDArray[Any]
             raster[t, channels[e]] = 1
 
 
-class World(NamedTuple):
-    """Task and patterns in the form in which compiled code takes them. Made by `world`."""
+class TaskArrays(NamedTuple):
+    """Task and patterns in the form in which compiled code takes them. Made by `task_arrays`."""
 
     n_inputs: int
     pattern_bins: int
@@ -236,7 +236,7 @@ class World(NamedTuple):
     pattern_offsets: NDArray[np.int64]
 
 
-def world(task: Task, patterns: Patterns) -> World:
+def task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
     """Task and patterns for compiled code; ValueError if they do not fit each other."""
     expected = (task.n_classes, task.pattern_bins, task.n_inputs)
     if not isinstance(patterns, Patterns):
@@ -249,13 +249,13 @@ def world(task: Task, patterns: Patterns) -> World:
             f"patterns must have shape (n_classes, pattern_bins, n_inputs) = {expected} as the "
             f"task says, got {patterns.shape}"
         )
-    return _world(task, patterns)
+    return _task_arrays(task, patterns)
 
 
 @functools.lru_cache(maxsize=64)
-def _world(task: Task, patterns: Patterns) -> World:
+def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
     with np.errstate(divide="ignore"):
-        return World(
+        return TaskArrays(
             task.n_inputs,
             task.pattern_bins,
             task.background_bins,

@@ -14,7 +14,7 @@ from gnm_env.checks import whole
 from gnm_env.compiled import compiled
 from gnm_env.generators import Generators
 from gnm_env.sampling import append_trial
-from gnm_env.task import Patterns, Task, World, dense, sparse, world
+from gnm_env.task import Patterns, Task, TaskArrays, dense, sparse, task_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,10 +171,10 @@ def draw_trial(task: Task, patterns: Patterns, rng: Generator) -> Trial:
     bin chosen uniformly; T = background_bins + M·Σ k_c. The environments draw the same trials from
     the same generator.
     """
-    return draw_next(task, world(task, patterns), Generators([rng]))
+    return draw_next(task, task_arrays(task, patterns), Generators([rng]))
 
 
-def draw_next(task: Task, numbers: World, generators: Generators) -> Trial:
+def draw_next(task: Task, numbers: TaskArrays, generators: Generators) -> Trial:
     """`draw_trial` from the first of `generators`, for a caller who keeps them: at less cost."""
     channels, offsets, onsets, classes, targets = _draw(generators.held, numbers)
     return Trial(channels, offsets, onsets, classes, targets, task.n_inputs, task.pattern_bins)
@@ -182,14 +182,14 @@ def draw_next(task: Task, numbers: World, generators: Generators) -> Trial:
 
 @compiled
 def _draw(
-    held: Any, world: World
+    held: Any, task: TaskArrays
 ) -> tuple[
     NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
 ]:
     """Channels, offsets, onsets, classes and targets of one trial, in arrays of their own."""
     channels, offsets, onsets, classes, n_bins, n_occurrences, _ = append_trial(
         held[0],
-        world,
+        task,
         np.empty(256, np.int32),
         np.zeros(512, np.int64),
         np.empty(8, np.int64),
@@ -203,5 +203,5 @@ def _draw(
         offsets[: n_bins + 1].copy(),
         onsets[:n_occurrences].copy(),
         classes,
-        world.targets[classes],
+        task.targets[classes],
     )

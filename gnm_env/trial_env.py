@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gnm_env.checks import choice, real
 from gnm_env.pattern_env import PatternEnv, spike_from
-from gnm_env.scoring import reward_for
+from gnm_env.rules import reward_for
 from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_next
 
@@ -101,7 +101,7 @@ class PatternTrialEnv(PatternEnv):
         super().reset(seed=seed)
         trial = self._refuse_options(options, ("trial",)).get("trial")
         if trial is None:
-            trial = draw_next(self.task, self._world, self._generators())
+            trial = draw_next(self.task, self._task_arrays, self._generators())
         self._begin(trial)
         return self._ahead.pop(), {}
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from gnm_env.checks import choice, real, whole
 from gnm_env.generators import Generators
 from gnm_env.reused import ReusedRows
+from gnm_env.rules import MISTAKES
 from gnm_env.sampling import PIECE_BINS
-from gnm_env.scoring import MISTAKES
-from gnm_env.task import Patterns, Task, world
+from gnm_env.task import Patterns, Task, task_arrays
 from gnm_env.trial_env import FEEDBACK, OUTPUT
 from gnm_env.vector_kernels import (
     COST,
@@ -101,7 +101,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self.num_envs = whole("num_envs", num_envs, low=1)
         self.task = task
         self.patterns = Patterns.draw(task, pattern_seed) if patterns is None else patterns
-        self._world = world(task, self.patterns)
+        self._task_arrays = task_arrays(task, self.patterns)
         if render_mode is not None:
             raise ValueError(
                 f"render_mode must be None, got {render_mode!r}: many environments at once draw no "
@@ -138,7 +138,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     ) -> Any:
         return new_crowd(
             self._seeded().held,
-            self._world,
+            self._task_arrays,
             AUTORESET[self.autoreset_mode],
             self._limit,
             most,

@@ -24,6 +24,7 @@ from numba.experimental import structref
 from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled
+from gnm_env.rules import compiled_mistake, compiled_reward_for
 from gnm_env.sampling import (
     DRAFT,
     append_piece,
@@ -31,8 +32,7 @@ from gnm_env.sampling import (
     fill_trial,
     longer_buffers,
 )
-from gnm_env.scoring import compiled_mistake_in_pattern, compiled_reward_for
-from gnm_env.task import World
+from gnm_env.task import TaskArrays
 
 NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2
 COST, SIGN, DENSE = 0, 1, 2
@@ -99,7 +99,7 @@ structref.define_constructor(
     CrowdType,
     [
         "held",  # the generators
-        "world",
+        "task",
         "autoreset",
         "limit",  # bins after which an episode is truncated
         "most",  # greatest action
@@ -135,7 +135,7 @@ structref.define_constructor(
 @compiled
 def new_crowd(
     held: Any,
-    world: World,
+    task: TaskArrays,
     autoreset: int,
     limit: int,
     most: float,
@@ -153,7 +153,7 @@ def new_crowd(
     """A Crowd in which no environment has begun."""
     n = observations.shape[0]
     return Crowd(
-        held, world, autoreset, limit, most, feedback, tolerance,
+        held, task, autoreset, limit, most, feedback, tolerance,
         np.zeros((4, n), np.uint32), state, emitted,
         events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
         # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
@@ -351,7 +351,7 @@ def _draw_trials(crowd: Any, which: NDArray[np.int64], first: int, is_new: bool)
     Returns the number of the environment for which there was not enough room, or that of all. No
     array is exchanged for a longer one in here: numba counts references to those that are.
     """
-    held, world, state, emitted = crowd.held, crowd.world, crowd.state, crowd.emitted
+    held, task, state, emitted = crowd.held, crowd.task, crowd.state, crowd.emitted
     events, parts, shift, limit = crowd.events, crowd.parts, crowd.shift, crowd.limit
     bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
     channels, offsets, onsets, classes = crowd.channels, crowd.offsets, crowd.onsets, crowd.classes
@@ -362,7 +362,7 @@ def _draw_trials(crowd: Any, which: NDArray[np.int64], first: int, is_new: bool)
         i = which[n]
         if is_new:
             begin_trial(draft, offsets, 0, 0)
-        fits = fill_trial(held[i], world, channels, offsets, onsets, classes, draft)
+        fits = fill_trial(held[i], task, channels, offsets, onsets, classes, draft)
         n_bins, n_occurrences = draft[0].bin_, draft[0].occurrence
         fits = fits and offsets[n_bins] < events.shape[1] and n_occurrences <= parts.shape[1]
         if fits:
@@ -384,7 +384,7 @@ def _make_room(crowd: Any) -> None:
     """Room for what is drawn, or for the one trial that is drawn, where there was too little."""
     draft, offsets = crowd.draft[0], crowd.offsets
     crowd.channels, crowd.offsets, crowd.onsets, crowd.classes = longer_buffers(
-        crowd.world, crowd.channels, offsets, crowd.onsets, crowd.classes, crowd.draft
+        crowd.task, crowd.channels, offsets, crowd.onsets, crowd.classes, crowd.draft
     )
     crowd.events = _widened(crowd.events, draft.n_events + 1)
     crowd.parts = _widened(crowd.parts, draft.occurrence)
@@ -411,7 +411,7 @@ def step_trials(
     if crowd.feedback == DENSE:
         for i in range(actions.size):
             rewards[i] = _dense_reward(
-                crowd.state[i], bins[i], actions[i], crowd.world, crowd.parts[i], crowd.tolerance
+                crowd.state[i], bins[i], actions[i], crowd.task, crowd.parts[i], crowd.tolerance
             )
         for i in over[: crowd.n_over]:
             rewards[i] = 0.0
@@ -455,14 +455,14 @@ def _tell(crowd: Any) -> bool:
         if _is_used_up(crowd, i):
             s, output = crowd.state[i], crowd.emitted[i]
             terminated[i] = True
-            labels[i], outputs[i], pattern_bins[i] = s.label, output, crowd.world.pattern_bins
+            labels[i], outputs[i], pattern_bins[i] = s.label, output, crowd.task.pattern_bins
             if crowd.feedback != DENSE:
                 rewards[i] = compiled_reward_for(
                     s.label - output, crowd.tolerance, crowd.feedback == SIGN
                 )
             report = _reported(
                 report, heads[n_told], end, i, crowd.parts[i, : s.n_occurrences],
-                crowd.world.targets,
+                crowd.task.targets,
             )  # fmt: skip
             end = heads[n_told, 4]
             n_told += 1
@@ -494,7 +494,7 @@ def _dense_reward(
     s: Any,
     bin_: int,
     action: float,
-    world: World,
+    task: TaskArrays,
     occurrences: NDArray[np.int64],
     tolerance: float,
 ) -> float:
@@ -502,9 +502,9 @@ def _dense_reward(
     if s.occurrence == s.n_occurrences or bin_ < occurrences[s.occurrence] >> 32:
         return 0.0 - action
     s.given += action
-    if bin_ + 1 < (occurrences[s.occurrence] >> 32) + world.pattern_bins:
+    if bin_ + 1 < (occurrences[s.occurrence] >> 32) + task.pattern_bins:
         return 0.0
-    error = world.targets[occurrences[s.occurrence] & 0xFFFFFFFF] - s.given
+    error = task.targets[occurrences[s.occurrence] & 0xFFFFFFFF] - s.given
     s.occurrence += 1
     s.given = 0.0
     return float(compiled_reward_for(error, tolerance, False))
@@ -547,7 +547,7 @@ def _go_on(crowd: Any, which: NDArray[Any], begin: bool) -> None:
     if which.size == 0:
         return
     channels, offsets = crowd.channels, crowd.offsets
-    held, world, state = crowd.held, crowd.world, crowd.state
+    held, task, state = crowd.held, crowd.task, crowd.state
     events, shift = crowd.events, crowd.shift
     bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
     for i in which:
@@ -558,9 +558,9 @@ def _go_on(crowd: Any, which: NDArray[Any], begin: bool) -> None:
             if s.anew:
                 s.anew, s.noise_left = 0, -1.0
             channels, offsets, s.n_noise, s.class_, s.noise_left = append_piece(
-                held[i], world, s.noise_left, channels, offsets, 0
+                held[i], task, s.noise_left, channels, offsets, 0
             )
-            s.n_bins = s.n_noise + (world.pattern_bins if s.class_ >= 0 else 0)
+            s.n_bins = s.n_noise + (task.pattern_bins if s.class_ >= 0 else 0)
             if offsets[s.n_bins] >= events.shape[1]:
                 events = _widened(events, offsets[s.n_bins] + 1)
             _store(events, i, shift, s.n_bins, channels, offsets)
@@ -635,7 +635,7 @@ def _judge(crowd: Any, actions: NDArray[np.int64]) -> int:
     for i in looks[:n_looks]:
         used_up = _is_used_up(crowd, i)
         if used_up or actions[i] != 0:
-            mistake, class_ = _mistake(crowd.state[i], bins[i], actions[i], crowd.world.targets)
+            mistake, class_ = _mistake(crowd.state[i], bins[i], actions[i], crowd.task.targets)
             if mistake:
                 rewards[i] = 0.0
                 terminated[i] = True
@@ -658,4 +658,4 @@ def _mistake(s: Any, next_bin: int, spike: int, targets: NDArray[np.int64]) -> t
         return spike, -1
     s.count += spike
     last_bin = next_bin == s.n_bins
-    return compiled_mistake_in_pattern(s.count, targets[s.class_], last_bin), s.class_
+    return compiled_mistake(s.count, targets[s.class_], False, last_bin), s.class_

@@ -25,12 +25,12 @@ from agents.kernels.trial import (
     run_trial_template,
     sum_eligibility_template,
 )
-from agents.lanes import pack, store, unpack
 from agents.learning.rule import Rule
 from agents.neurons.neuron import Neuron
+from agents.simd import pack, store, unpack
 from gnm_env.compiled import compiled, specialise
 from gnm_env.sampling import append_piece, append_trial
-from gnm_env.task import World
+from gnm_env.task import TaskArrays
 
 # Bound by `_continuous_kernels`.
 step: Any = None
@@ -132,7 +132,7 @@ def rounded(S: float) -> float:
 
 
 def survive_template(
-    rng: Generator, world: World, cap: int, mode: Any, parameters: Block, weights: Block
+    rng: Generator, task: TaskArrays, cap: int, mode: Any, parameters: Block, weights: Block
 ) -> Block:
     """Bins that each neuron survives on one endless stream from `rng`, at most `cap`.
 
@@ -151,11 +151,11 @@ def survive_template(
     heard_bins = 0
     while heard_bins < cap and alive.any():
         channels, offsets, n_noise, class_, noise_left = append_piece(
-            rng, world, noise_left, channels, offsets, 0
+            rng, task, noise_left, channels, offsets, 0
         )
-        n_bins = min(n_noise + (world.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
-        owed = world.targets[class_] if class_ >= 0 else 0
-        last_bin = n_noise + world.pattern_bins - 1
+        n_bins = min(n_noise + (task.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
+        owed = task.targets[class_] if class_ >= 0 else 0
+        last_bin = n_noise + task.pattern_bins - 1
         for k in range(n_neurons):
             if not alive[k]:
                 continue
@@ -183,25 +183,25 @@ def survive_template(
 
 
 def answer_template(
-    rng: Generator, world: World, trials: int, mode: Any, parameters: Block, weights: Block
+    rng: Generator, task: TaskArrays, trials: int, mode: Any, parameters: Block, weights: Block
 ) -> tuple[NDArray[np.int64], Block, Block, int]:
     """Rounded responses of each neuron to `trials` trials; as in `agents.kernels.streams`."""
     n_neurons = len(weights)
-    table = np.zeros((n_neurons, 1, world.n_classes, MOST_SPIKES + 1), np.int64)
+    table = np.zeros((n_neurons, 1, task.n_classes, MOST_SPIKES + 1), np.int64)
     false_alarms = np.zeros((n_neurons, 1, 1))
     wrong = np.zeros((n_neurons, 1, 1))
     channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
     onsets, classes = np.empty(8, np.int64), np.empty(8, np.int64)
     for _ in range(trials):
         channels, offsets, onsets, classes, n_bins, n_occurrences, label = append_trial(
-            rng, world, channels, offsets, onsets, classes, 0, 0
+            rng, task, channels, offsets, onsets, classes, 0, 0
         )
         heard = Heard(
             channels,
             offsets[: n_bins + 1],
             onsets[:n_occurrences],
-            world.targets[classes[:n_occurrences]],
-            world.pattern_bins,
+            task.targets[classes[:n_occurrences]],
+            task.pattern_bins,
         )
         log = Log(np.empty((n_bins, 1)), np.empty((n_bins, 1)), np.empty((n_occurrences, 1)))
         for k in range(n_neurons):
@@ -213,7 +213,7 @@ def answer_template(
             for j in range(n_occurrences):
                 given = min(int(rounded(log.counts[j, 0])), MOST_SPIKES)
                 table[k, 0, classes[j], given] += 1
-    return table, false_alarms, wrong, trials * world.background_bins
+    return table, false_alarms, wrong, trials * task.background_bins
 
 
 @compiled

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from agents.kernels.slots import WIDTH, Parameters, State, correction, learn_trial, step
 from agents.kernels.trial import Block, Heard, Log, drive_at
-from agents.lanes import full, load, pack, repeated, unpack, where
 from agents.learning.rule import Outcome
+from agents.simd import full, load, pack, repeated, unpack, where
 
 
 def record_template(

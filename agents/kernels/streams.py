@@ -20,7 +20,7 @@ from agents.kernels.slots import (
     step,
 )
 from agents.kernels.trial import Block, Heard, Log, drive_at
-from agents.lanes import any_lane, full, load, pack, repeated, store, unpack, where
+from agents.simd import any_lane, full, load, pack, repeated, store, unpack, where
 from gnm_env.compiled import compiled
 from gnm_env.sampling import (
     DRAFT,
@@ -30,7 +30,7 @@ from gnm_env.sampling import (
     fill_trial,
     longer_buffers,
 )
-from gnm_env.task import World
+from gnm_env.task import TaskArrays
 
 BATCH_BINS = 4_096
 """Trials are drawn ahead until this many bins are there (one trial at least): the parameters of a
@@ -43,7 +43,7 @@ MOST_SPIKES = 10
 @compiled
 def draw_trials(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     most: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
@@ -61,9 +61,9 @@ def draw_trials(
     drawn = longest = 0
     while drawn < most and bin_of[drawn] < BATCH_BINS:
         begin_trial(draft, offsets, bin_of[drawn], occurrence_of[drawn])
-        while not fill_trial(rng, world, channels, offsets, onsets, classes, draft):
+        while not fill_trial(rng, task, channels, offsets, onsets, classes, draft):
             channels, offsets, onsets, classes = longer_buffers(
-                world, channels, offsets, onsets, classes, draft
+                task, channels, offsets, onsets, classes, draft
             )
         drawn += 1
         bin_of[drawn], occurrence_of[drawn] = draft[0].bin_, draft[0].occurrence
@@ -73,7 +73,7 @@ def draw_trials(
 
 def train_template(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     trials: int,
     mode: Any,
     rule_mode: Any,
@@ -94,7 +94,7 @@ def train_template(
     n_blocks = len(weights)
     wrong = np.zeros((n_blocks, 1, WIDTH))
     absolute = np.zeros((n_blocks, 1, WIDTH))
-    eligibility = np.empty((world.n_inputs, WIDTH))
+    eligibility = np.empty((task.n_inputs, WIDTH))
     corrections = np.empty((1, WIDTH))
     sound = np.empty((1, WIDTH))
     # Buffers that a batch of the default task fits into.
@@ -109,9 +109,9 @@ def train_template(
     done = 0
     while done < trials:
         channels, offsets, onsets, classes, drawn, longest = draw_trials(
-            rng, world, trials - done, channels, offsets, onsets, classes, bin_of, occurrence_of
+            rng, task, trials - done, channels, offsets, onsets, classes, bin_of, occurrence_of
         )
-        owed = world.targets[classes[: occurrence_of[drawn]]]
+        owed = task.targets[classes[: occurrence_of[drawn]]]
         if longest > len(V):
             V = np.empty((2 * longest, WIDTH))
             above = np.empty((2 * longest if USES_ERROR else 0, WIDTH))
@@ -131,7 +131,7 @@ def train_template(
                     offsets[bin_of[k] : bin_of[k + 1] + 1],
                     onsets[occurrence_of[k] : occurrence_of[k + 1]],
                     owed[occurrence_of[k] : occurrence_of[k + 1]],
-                    world.pattern_bins,
+                    task.pattern_bins,
                 )
                 outcome, _ = run_trial(p, mode, its_weights, heard, log)
                 error = outcome.label - outcome.emitted
@@ -162,7 +162,7 @@ def train_template(
 
 
 def survive_template(
-    rng: Generator, world: World, cap: int, mode: Any, parameters: Block, weights: Block
+    rng: Generator, task: TaskArrays, cap: int, mode: Any, parameters: Block, weights: Block
 ) -> Block:
     """Bins that each neuron survives on one endless stream from `rng`, at most `cap`.
 
@@ -179,11 +179,11 @@ def survive_template(
     heard_bins = 0
     while heard_bins < cap and alive.any():
         channels, offsets, n_noise, class_, noise_left = append_piece(
-            rng, world, noise_left, channels, offsets, 0
+            rng, task, noise_left, channels, offsets, 0
         )
-        n_bins = min(n_noise + (world.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
-        owed = float(world.targets[class_]) if class_ >= 0 else 0.0
-        last_bin = n_noise + world.pattern_bins - 1
+        n_bins = min(n_noise + (task.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
+        owed = float(task.targets[class_]) if class_ >= 0 else 0.0
+        last_bin = n_noise + task.pattern_bins - 1
         for block in range(n_blocks):
             living = load(alive[block], 0, zero)
             if not any_lane(living > 0.0):
@@ -210,7 +210,7 @@ def survive_template(
 
 
 def answer_template(
-    rng: Generator, world: World, trials: int, mode: Any, parameters: Block, weights: Block
+    rng: Generator, task: TaskArrays, trials: int, mode: Any, parameters: Block, weights: Block
 ) -> tuple[NDArray[np.int64], Block, Block, int]:
     """Responses of each neuron to `trials` trials, without learning.
 
@@ -220,21 +220,21 @@ def answer_template(
     """
     zero = full(0.0, WIDTH)
     n_blocks = len(weights)
-    table = np.zeros((n_blocks, WIDTH, world.n_classes, MOST_SPIKES + 1), np.int64)
+    table = np.zeros((n_blocks, WIDTH, task.n_classes, MOST_SPIKES + 1), np.int64)
     false_alarms = np.zeros((n_blocks, 1, WIDTH))
     wrong = np.zeros((n_blocks, 1, WIDTH))
     channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
     onsets, classes = np.empty(8, np.int64), np.empty(8, np.int64)
     for _ in range(trials):
         channels, offsets, onsets, classes, n_bins, n_occurrences, _ = append_trial(
-            rng, world, channels, offsets, onsets, classes, 0, 0
+            rng, task, channels, offsets, onsets, classes, 0, 0
         )
         heard = Heard(
             channels,
             offsets[: n_bins + 1],
             onsets[:n_occurrences],
-            world.targets[classes[:n_occurrences]],
-            world.pattern_bins,
+            task.targets[classes[:n_occurrences]],
+            task.pattern_bins,
         )
         log = Log(
             np.empty((n_bins, WIDTH)), np.empty((n_bins, WIDTH)), np.empty((n_occurrences, WIDTH))
@@ -249,4 +249,4 @@ def answer_template(
                 for lane in range(WIDTH):
                     given = min(int(log.counts[k, lane]), MOST_SPIKES)
                     table[block, lane, classes[k], given] += 1
-    return table, false_alarms, wrong, trials * world.background_bins
+    return table, false_alarms, wrong, trials * task.background_bins

@@ -19,9 +19,9 @@ from agents.kernels.slots import (
     teaching_signal,
     weight_change,
 )
-from agents.lanes import any_lane, full, load, repeated, store, unpack, where
 from agents.learning.momentum import apply_change
 from agents.learning.rule import Outcome, RuleParameters
+from agents.simd import any_lane, full, load, repeated, store, unpack, where
 from gnm_env.compiled import compiled
 
 Block = NDArray[np.float64]

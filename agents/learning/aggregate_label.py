@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.lanes import like, load, store, where
 from agents.learning.rule import Outcome, Rule, RuleParameters
+from agents.simd import like, load, store, where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.lanes import load, store, where
 from agents.learning.rule import RuleParameters
+from agents.simd import load, store, where
 from gnm_env.compiled import compiled
 
 

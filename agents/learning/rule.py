@@ -2,7 +2,7 @@
 
 A rule acts once, at the end of a trial. It is one file beside this one, with a frozen dataclass
 derived from `Rule` and three compiled functions, written for one neuron or for many side by side
-(see `agents.lanes`):
+(see `agents.simd`):
 
 - `correction(outcome) -> c`: 0 in the lanes that the trial teaches nothing, else what
   `weight_change` wants to know, such as the sign of the error;

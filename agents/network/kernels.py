@@ -17,24 +17,24 @@ from agents.network.backpropagation import Rule, count_spikes, learn_trial, rule
 from agents.network.dynamics import Log, Row, Table, Wiring, new_log, run_trial, step, wiring_at
 from gnm_env.compiled import compiled
 from gnm_env.sampling import append_piece, append_trial
-from gnm_env.task import World
+from gnm_env.task import TaskArrays
 
 
 @compiled
 def _draw_trial(
-    rng: Generator, world: World, buffers: tuple[Any, Any, Any, Any]
+    rng: Generator, task: TaskArrays, buffers: tuple[Any, Any, Any, Any]
 ) -> tuple[Heard, NDArray[np.int64], tuple[Any, Any, Any, Any], int]:
     """The next trial, its classes, the buffers that now hold it, and its aggregate label."""
     channels, offsets, onsets, classes, n_bins, n_occurrences, label = append_trial(
-        rng, world, buffers[0], buffers[1], buffers[2], buffers[3], 0, 0
+        rng, task, buffers[0], buffers[1], buffers[2], buffers[3], 0, 0
     )
     which = classes[:n_occurrences]
     heard = Heard(
         channels,
         offsets[: n_bins + 1],
         onsets[:n_occurrences],
-        world.targets[which],
-        world.pattern_bins,
+        task.targets[which],
+        task.pattern_bins,
     )
     return heard, which, (channels, offsets, onsets, classes), label
 
@@ -48,7 +48,7 @@ def _new_buffers() -> tuple[Any, Any, Any, Any]:
 @compiled
 def train(
     rng: Generator,
-    world: World,
+    task: TaskArrays,
     trials: int,
     wirings: Table,
     rules: Table,
@@ -74,7 +74,7 @@ def train(
     E = np.empty(0)
     counts = np.empty(0, np.int64)
     for trial in range(trials):
-        heard, _, buffers, label = _draw_trial(rng, world, buffers)
+        heard, _, buffers, label = _draw_trial(rng, task, buffers)
         n_bins = len(heard.offsets) - 1
         if n_bins > len(E):
             log = new_log(2 * n_bins, hidden)
@@ -100,7 +100,7 @@ def train(
 
 @compiled
 def survive(
-    rng: Generator, world: World, cap: int, wirings: Table, weights: Table
+    rng: Generator, task: TaskArrays, cap: int, wirings: Table, weights: Table
 ) -> NDArray[np.int64]:
     """Bins that each network survives on one endless stream from `rng`, at most `cap`.
 
@@ -118,11 +118,11 @@ def survive(
     heard_bins = 0
     while heard_bins < cap and alive.any():
         channels, offsets, n_noise, class_, noise_left = append_piece(
-            rng, world, noise_left, channels, offsets, 0
+            rng, task, noise_left, channels, offsets, 0
         )
-        n_bins = min(n_noise + (world.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
-        owed = world.targets[class_] if class_ >= 0 else 0
-        last_bin = n_noise + world.pattern_bins - 1
+        n_bins = min(n_noise + (task.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
+        owed = task.targets[class_] if class_ >= 0 else 0
+        last_bin = n_noise + task.pattern_bins - 1
         for n in range(n_networks):
             if not alive[n]:
                 continue
@@ -143,7 +143,7 @@ def survive(
 
 @compiled
 def answer(
-    rng: Generator, world: World, trials: int, wirings: Table, weights: Table
+    rng: Generator, task: TaskArrays, trials: int, wirings: Table, weights: Table
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Responses of each network to `trials` trials, without learning.
 
@@ -152,13 +152,13 @@ def answer(
     """
     n_networks = len(weights)
     hidden = wiring_at(wirings, 0).hidden
-    table = np.zeros((n_networks, world.n_classes, MOST_SPIKES + 1), np.int64)
+    table = np.zeros((n_networks, task.n_classes, MOST_SPIKES + 1), np.int64)
     false_alarms = np.zeros(n_networks, np.int64)
     wrong = np.zeros(n_networks, np.int64)
     state = np.empty(3 * hidden + 1)
     buffers = _new_buffers()
     for _ in range(trials):
-        heard, classes, buffers, label = _draw_trial(rng, world, buffers)
+        heard, classes, buffers, label = _draw_trial(rng, task, buffers)
         log = new_log(len(heard.offsets) - 1, hidden)
         counts = np.empty(len(classes), np.int64)
         for n in range(n_networks):

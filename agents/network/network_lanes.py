@@ -13,7 +13,7 @@ from agents.lane_group import Answers
 from agents.network import kernels
 from agents.network.backpropagation import rule_row
 from agents.network.dynamics import wiring_row
-from gnm_env.task import Patterns, Task, world
+from gnm_env.task import Patterns, Task, task_arrays
 
 if TYPE_CHECKING:
     from agents.network.network_agent import NetworkAgent
@@ -24,7 +24,7 @@ class NetworkLanes:
 
     def __init__(self, agents: Sequence[NetworkAgent], task: Task, patterns: Patterns) -> None:
         self._agents = list(agents)
-        self._world = world(task, patterns)
+        self._task_arrays = task_arrays(task, patterns)
         for agent in self._agents:
             if agent.n_inputs != task.n_inputs:
                 raise ValueError(
@@ -43,7 +43,7 @@ class NetworkLanes:
 
     def train(self, rng: Generator, trials: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         wrong, absolute = kernels.train(
-            rng, self._world, trials, self._wirings, self._rules,
+            rng, self._task_arrays, trials, self._wirings, self._rules,
             self._weights, self._previous, self._overflow, self._trials,
         )  # fmt: skip
         self._trials += trials
@@ -51,15 +51,15 @@ class NetworkLanes:
 
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
         bins: NDArray[np.int64] = kernels.survive(
-            rng, self._world, cap, self._wirings, self._weights
+            rng, self._task_arrays, cap, self._wirings, self._weights
         )
         return bins
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         table, false_alarms, wrong = kernels.answer(
-            rng, self._world, trials, self._wirings, self._weights
+            rng, self._task_arrays, trials, self._wirings, self._weights
         )
-        noise_bins = trials * self._world.background_bins
+        noise_bins = trials * self._task_arrays.background_bins
         return Answers(table, false_alarms, noise_bins, wrong, trials)
 
     def write_back(self) -> None:

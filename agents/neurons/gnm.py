@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.lanes import any_lane, like, negated, power, where
 from agents.neurons.neuron import Neuron, Response, Trace
+from agents.simd import any_lane, like, negated, power, where
 from gnm_env.checks import choice, real
 from gnm_env.compiled import compiled, specialise
 

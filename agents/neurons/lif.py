@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.lanes import where
 from agents.neurons.neuron import Neuron, Response, Trace
+from agents.simd import where
 from gnm_env.checks import real, whole
 from gnm_env.compiled import compiled
 

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.lanes import negated, where
 from agents.neurons.neuron import Neuron, Response, Trace
+from agents.simd import negated, where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled
 

@@ -6,7 +6,7 @@ A neuron is one file beside this one. It holds
 - `Parameters`, a NamedTuple of the numbers that the step needs, one per lane;
 - `State`, a NamedTuple of what passes from bin to bin; all zeros at the beginning of a trial;
 - `step(p, mode, state, drive) -> (state, Response)`: one bin, compiled, for one neuron or for many
-  side by side (see `agents.lanes`). `drive` is I(t), the weighted input of the bin.
+  side by side (see `agents.simd`). `drive` is I(t), the weighted input of the bin.
 
 The dataclass names the two types in `parameters_type` and `state_type`; its method `step` gives the
 compiled step that suits its parameters.

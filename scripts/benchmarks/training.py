@@ -29,7 +29,7 @@ from benchmarks.rows import Findings, Row, Target, rate_rows
 from benchmarks.timing import Settings, Skip, Subject, Timing, race
 from gnm_env import Patterns, Task
 from gnm_env.generators import Generators
-from gnm_env.task import world
+from gnm_env.task import task_arrays
 from gnm_env.trial import draw_next
 
 BINS = "million neuron-bins/s"
@@ -56,7 +56,7 @@ def bins(task: Task, trials: int, seed: int) -> int:
 
 def trial_bins(task: Task, trials: int, seed: int) -> NDArray[np.int64]:
     """Bins of each of these trials, (trials,)."""
-    numbers = world(task, Patterns.draw(task, 0))
+    numbers = task_arrays(task, Patterns.draw(task, 0))
     generators = Generators([np.random.default_rng(seed)])
     lengths = (draw_next(task, numbers, generators).n_bins for _ in range(trials))
     return np.fromiter(lengths, np.int64, trials)

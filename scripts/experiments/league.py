@@ -28,7 +28,7 @@ from experiments.training import (
 )
 from gnm_env import Patterns, PatternStreamEnv, Task
 from gnm_env.sampling import append_piece, new_buffers
-from gnm_env.task import world
+from gnm_env.task import task_arrays
 
 MILESTONES = (100_000, 200_000, 400_000, 800_000, 1_600_000, 4_000_000, 8_000_000, 12_000_000)
 """Bins heard at which a learner is scored; it is scored once more when its budget is spent."""
@@ -319,7 +319,7 @@ def _oracle(task: Task, patterns: Patterns, seed: int, cap: int) -> int:
 
 def _right_answers(task: Task, patterns: Patterns, seed: int) -> Iterator[int]:
     """0 in noise; in an occurrence the spikes owed, one a bin from its first bin on."""
-    rng, numbers, noise_left = np.random.default_rng(seed), world(task, patterns), -1.0
+    rng, numbers, noise_left = np.random.default_rng(seed), task_arrays(task, patterns), -1.0
     channels, offsets = new_buffers()[:2]
     while True:
         channels, offsets, n_noise, class_, noise_left = append_piece(

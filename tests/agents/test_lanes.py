@@ -10,7 +10,7 @@ import pytest
 from numba import njit
 from numpy.typing import NDArray
 
-from agents.lanes import (
+from agents.simd import (
     any_lane,
     full,
     like,

@@ -19,7 +19,7 @@ from scipy import stats
 from gnm_env import Patterns, Task, draw_trial
 from gnm_env.compiled import compiled
 from gnm_env.sampling import append_piece, append_trial, new_buffers
-from gnm_env.task import dense, world
+from gnm_env.task import dense, task_arrays
 from tests.gnm_env import reference
 
 FALSE_ALARM = 1e-6
@@ -96,7 +96,7 @@ class TestSameBitsAsNumPy:
         expected = reference.pieces(task, patterns.dense(), plain)
         for _ in range(6):
             channels, offsets, n_noise, class_, noise_left = append_piece(
-                ours, world(task, patterns), noise_left, *new_buffers()[:2], 0
+                ours, task_arrays(task, patterns), noise_left, *new_buffers()[:2], 0
             )
             before, pattern, expected_class = next(expected)
             n_bins = n_noise + (task.pattern_bins if class_ >= 0 else 0)
@@ -107,7 +107,7 @@ class TestSameBitsAsNumPy:
     def test_trials_laid_end_to_end_are_those_drawn_one_by_one(self) -> None:
         task = Task(n_classes=2)
         patterns = Patterns.draw(task, seed=1)
-        numbers = world(task, patterns)
+        numbers = task_arrays(task, patterns)
         buffers: tuple[Any, ...] = new_buffers()
         ours, single = np.random.default_rng(2), np.random.default_rng(2)
         bin_ = occurrence = 0
@@ -238,7 +238,7 @@ class TestTrials:
 def many_pieces() -> tuple[Any, Any]:
     """Noise bins and class of each piece of a stream."""
     task = Task(n_classes=3, n_inputs=2, pattern_bins=4, onset_probability=0.02)
-    rng, numbers = np.random.default_rng(8), world(task, Patterns.draw(task, 0))
+    rng, numbers = np.random.default_rng(8), task_arrays(task, Patterns.draw(task, 0))
     noise, classes, left = [], [], -1.0
     for _ in range(6_000):
         *_, n_noise, class_, left = append_piece(rng, numbers, left, *new_buffers()[:2], 0)
@@ -322,7 +322,7 @@ def test_buffers_that_are_too_short_change_nothing(
         draw_trial(task, patterns, rng)
         first_bin, first = before.n_bins, len(before.onsets)
         *buffers, end_bin, end, label = append_trial(
-            rng, world(task, patterns), *buffers, first_bin, first
+            rng, task_arrays(task, patterns), *buffers, first_bin, first
         )
         channels, offsets, onsets, classes = buffers
         relative = offsets[first_bin : end_bin + 1] - offsets[first_bin]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gnm_env import Patterns, Task
-from gnm_env.task import MAX_MEAN_BINS, world
+from gnm_env.task import MAX_MEAN_BINS, task_arrays
 
 
 class TestTask:
@@ -144,9 +144,9 @@ class TestWorld:
     @pytest.mark.parametrize("field", ["n_classes", "pattern_bins", "n_inputs"])
     def test_patterns_must_fit_the_task(self, field: str) -> None:
         with pytest.raises(ValueError, match="patterns must have shape") as refusal:
-            world(Task(**{field: 7}), Patterns.draw(Task(), 0))
+            task_arrays(Task(**{field: 7}), Patterns.draw(Task(), 0))
         assert "(1, 50, 100)" in str(refusal.value)
 
     def test_patterns_must_be_patterns(self) -> None:
         with pytest.raises(ValueError, match=r"use Patterns\.from_dense"):
-            world(Task(), "patterns")  # type: ignore[arg-type]
+            task_arrays(Task(), "patterns")  # type: ignore[arg-type]

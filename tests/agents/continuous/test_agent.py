@@ -32,7 +32,7 @@ from agents.continuous.outputs import (
 from agents.learning.rule import Rule
 from gnm_env import Patterns, Task, Trial, draw_trial
 from gnm_env.sampling import append_piece
-from gnm_env.task import world
+from gnm_env.task import task_arrays
 
 TASK = Task(n_inputs=30, n_classes=2, rate=0.02, pattern_bins=20, background_bins=40)
 PATTERNS = Patterns.draw(TASK, seed=4)
@@ -196,7 +196,7 @@ def mistakes_by_hand(agent: ContinuousAgent, seed: int, cap: int) -> int:
     agent.begin_trial()
     while True:
         channels, offsets, n_noise, class_, left = append_piece(
-            rng, world(TASK, PATTERNS), left, channels, offsets, 0
+            rng, task_arrays(TASK, PATTERNS), left, channels, offsets, 0
         )
         length = n_noise + (TASK.pattern_bins if class_ >= 0 else 0)
         for t in range(length):

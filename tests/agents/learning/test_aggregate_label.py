@@ -11,9 +11,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from agents import GNM, LIF, MST, AggregateLabel, NeuronAgent, record, train
-from agents.lanes import full, load, store
 from agents.learning.aggregate_label import nth_largest
 from agents.neurons.neuron import Neuron
+from agents.simd import full, load, store
 from gnm_env import Patterns, Task, Trial, draw_trial
 from tests.agents import reference
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, BUSY_WEIGHT, play, trial_env
