@@ -9,8 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from gnm_env.base.env import PatternEnv, spike_from
 from gnm_env.checks import choice, real
-from gnm_env.pattern_env import PatternEnv, spike_from
 from gnm_env.rules import reward_for
 from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_next

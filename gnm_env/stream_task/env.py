@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.base.env import PatternEnv, spike_from
 from gnm_env.compiled import compiled
-from gnm_env.pattern_env import PatternEnv, spike_from
 from gnm_env.rules import MISTAKES, mistake
 from gnm_env.sampling import append_piece, new_buffers
 from gnm_env.task import Patterns, Task, TaskArrays, dense
