@@ -6,20 +6,18 @@ agent registers itself with `register_kind`, so that `load_checkpoint` opens any
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import json
 import os
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from gnm_env.files import atomic_write as atomic_write
 from gnm_env.task import Patterns, Task, task_arrays
 
 FORMAT = 1
@@ -70,39 +68,6 @@ def register_kind(kind: str) -> Callable[[_Class], _Class]:
         return cls
 
     return register
-
-
-@contextlib.contextmanager
-def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """A binary file that takes the place of `path` once complete; a failure leaves the old one.
-
-    Raises ValueError if the folder cannot be written.
-    """
-    target = Path(path)
-    if target.is_dir():
-        raise ValueError(f"cannot write {target}: it is a folder; give the path of a file in it")
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
-        raise ValueError(
-            f"cannot write {target}: {error.strerror}; choose a folder that exists and is writable"
-        ) from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def write(
