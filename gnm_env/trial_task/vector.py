@@ -15,7 +15,6 @@ from gnm_env.base.vector import PatternVectorEnv, Step, read_only
 from gnm_env.checks import choice, real
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
-from gnm_env.trial_task.env import FEEDBACK, OUTPUT
 from gnm_env.trial_task.kernels import (
     TRIAL_STATE,
     TrialResults,
@@ -23,6 +22,7 @@ from gnm_env.trial_task.kernels import (
     report_of,
     step_trials,
 )
+from gnm_env.trial_task.params import FEEDBACK, OUTPUT
 
 FEEDBACK_NUMBER = {"cost": COST, "sign": SIGN, "dense": DENSE}
 
