@@ -100,8 +100,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
 
     def _most_bins(self) -> float:
         if self.trials is not None:
-            arrays = self.trials.arrays
-            return float(arrays.edges[arrays.first_edge[1:] - 1].max())
+            return float(self.trials.n_bins.max())
         # A Poisson number exceeds this with a probability below 1e-80.
         assert self.task is not None
         mean = self.task.n_classes * self.task.mean_occurrences
@@ -123,6 +122,11 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         state = super()._new_state(growing)
         self._report = growing_of(state).report
         return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if state["trials"] is not None:  # one data set, not two equal ones
+            state["_source"] = state["_source"]._replace(trials=state["trials"].arrays)
+        super().__setstate__(state)
 
     def _reseeded(self, i: int) -> None:
         self._episodes.records[i]["anew"] = 1
