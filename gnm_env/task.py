@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gnm_env.checks import real, whole
+from gnm_env.checks import real, shown, whole, whole_array
 from gnm_env.compiled import compiled
 
 MAX_MEAN_BINS = 100_000_000
@@ -187,6 +187,36 @@ class Patterns:
 
     def __hash__(self) -> int:
         return hash((self.shape, self.channels.tobytes(), self.offsets.tobytes()))
+
+
+def checked_events(
+    channels: Any, offsets: Any, n_inputs: int
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Copies of channels and offsets that compiled code may rely on; ValueError if they are not.
+
+    Offsets begin with 0, never fall and end with the number of channels; channels lie in
+    0 … n_inputs − 1 and ascend within a bin.
+    """
+    spikes = whole_array("channels", channels, 0, n_inputs - 1, np.int32)
+    ends = whole_array("offsets", offsets, 0, len(spikes))
+    if len(ends) < 2 or ends[0] != 0 or ends[-1] != len(spikes):
+        raise ValueError(
+            "offsets must have one entry more than there are bins (>= 1), from 0 to the number of "
+            f"channels, {len(spikes)}, got {shown(ends.tolist()[:8])}"
+        )
+    if np.any(np.diff(ends) < 0):
+        bin_ = int(np.argmax(np.diff(ends) < 0))
+        raise ValueError(f"offsets must never fall, got {ends[bin_]}, {ends[bin_ + 1]}")
+    ascends = np.diff(spikes) > 0
+    begins = ends[(ends > 0) & (ends < len(spikes))]
+    ascends[begins - 1] = True
+    if not ascends.all():
+        bin_ = int(np.searchsorted(ends, int(np.argmin(ascends)), side="right")) - 1
+        raise ValueError(
+            "channels must ascend within a bin, "
+            f"got {shown(spikes[ends[bin_] : ends[bin_ + 1]].tolist())} in bin {bin_}"
+        )
+    return spikes, ends
 
 
 def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -12,7 +12,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from gnm_env import Patterns, Task
-from gnm_env.vector_env import PatternStreamVectorEnv, PatternTrialVectorEnv
+from gnm_env.stream_task.vector import PatternStreamVectorEnv
+from gnm_env.trial_task.vector import PatternTrialVectorEnv
 
 TRIAL, STREAM = "gnm/PatternTrial-v0", "gnm/PatternStream-v0"
 NUM_ENVS = 5
