@@ -71,7 +71,7 @@ $(VENV)/.for-train: $(NEEDS)
 
 $(VENV)/.for-test: $(NEEDS)
 	@echo "Installing what the tests need into $(VENV); with torch this takes minutes ..."
-	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,dev]"
+	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,dev]"
 	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $@
 
 $(VENV)/.for-benchmark: $(NEEDS)

@@ -31,6 +31,9 @@ MAX_LABEL = 1_000_000_000_000_000
 MAX_SEED = 2**128 - 1
 """Largest seed, as many bits as NumPy recommends; and the largest whole number of any kind."""
 
+VERY_MANY = 100_000
+"""An upper limit beyond it is named only when it is exceeded."""
+
 SMALL_BYTES = 2**26
 """Arrays up to this size are allocated without asking how much memory there is."""
 
@@ -45,19 +48,23 @@ def shown(value: Any) -> str:
 
 
 def whole(name: str, value: Any, low: int, high: int | None = None) -> int:
-    """`value` as an int in low … high (inclusive; None: MAX_SEED), or ValueError."""
+    """`value` as an int in low … high (inclusive; None: MAX_SEED), or ValueError.
+
+    A high beyond VERY_MANY is no part of what a number means: it is told to those who exceed it.
+    """
     try:
         if isinstance(value, bool):
             raise TypeError
         number = operator.index(value)
     except TypeError:
         raise ValueError(f"{name} must be a whole number, got {shown(value)}") from None
-    if low <= number <= (MAX_SEED if high is None else high):
+    high = MAX_SEED if high is None else high
+    if low <= number <= high:
         return number
-    if high is not None:
+    if high <= VERY_MANY:
         bound = f"in {low} … {high}"
     else:
-        bound = f">= {low}" if number < low else f"at most {MAX_SEED}"
+        bound = f">= {low}" if number < low else f"at most {high:,}"
     raise ValueError(f"{name} must be {bound}, got {shown(number)}")
 
 

@@ -86,7 +86,7 @@ class Trial:
         which = np.zeros(len(first), np.int64) if classes is None else classes
         self._classes = whole_array("classes", which, 0, MAX_INPUTS)
         _check_presentations(first, last, self._classes, owed, n_bins)
-        self._pattern_bins = _common_length(first, last, pattern_bins)
+        self._pattern_bins = common_length(first, last, pattern_bins)
         edges = np.empty(2 * len(first) + 2, np.int64)
         target = np.empty(2 * len(first) + 1, np.int64)
         fill_segments(first, last, owed, n_bins, edges, target)
@@ -420,7 +420,7 @@ def _check_presentations(
         raise ValueError(f"targets must add up to at most {MAX_LABEL:,}, got {targets.sum():,}")
 
 
-def _common_length(
+def common_length(
     onsets: NDArray[np.int64], ends: NDArray[np.int64], given: int | None
 ) -> int | None:
     """The length of all presentations; `given` if there is none, None where they differ."""
