@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,7 +32,17 @@ from tests.agents.learning.oracles.critical import (
     critical_thresholds,
     spike_train,
 )
-from tests.agents.learning.oracles.neurons import GNM, LIF, MST, Floats, Spec, hear, kernel, traces
+from tests.agents.learning.oracles.neurons import (
+    GNM,
+    LIF,
+    MST,
+    Floats,
+    Spec,
+    hear,
+    kernel,
+    spec,
+    traces,
+)
 from tests.agents.learning.oracles.rules import Lesson, Trial, act
 from tests.agents.learning.oracles.trials import NEURONS, Case, binary_cases, cases, kinds
 
@@ -248,7 +260,8 @@ def test_critical_threshold_of_the_multi_spike_tempotron_by_hand() -> None:
     assert heard.times == [1]
     (found,) = critical_thresholds(EXACT, heard.U, 1, 2)
     assert found.theta == pytest.approx(0.8125, rel=1e-14)
-    assert (found.bin_, found.C) == (5, pytest.approx(1.0625))
+    assert found.bin_ == 5
+    assert found.C == pytest.approx(1.0625)
     lesson = rules.critical_threshold(tempotron_trial(2), EXACT, weights, 1.0)
     assert_taught(lesson, y_of((5, 1 / 1.0625)), np.array([K5, 1.0, 0.0]) / 1.0625)
     # With weight 1 there is a second spike in bin 5: ρ(5) = 1.36328125 / 1.0625. The first spike
@@ -549,21 +562,19 @@ def _policy(trial: Trial, neuron: Any, weights: Floats) -> Lesson:
 
 EVERY_RULE: dict[str, Callable[[Trial, Spec, Floats], Lesson]] = {
     "critical": rules.critical_threshold,
-    "critical_amount": lambda *of: rules.critical_threshold(*of, amount=True),
-    "critical_crossing": lambda *of: rules.critical_threshold(*of, at="crossing"),
+    "critical_amount": partial(rules.critical_threshold, amount=True),
+    "critical_crossing": partial(rules.critical_threshold, at="crossing"),
     "mpdal": rules.mpdal,
     "peak_error": rules.peak_error,
-    "peak_error_first": lambda *of: rules.peak_error(*of, first_only=True),
+    "peak_error_first": partial(rules.peak_error, first_only=True),
     "superspike": rules.surrogate_gradient,
-    "triangle_on_count": lambda *of: rules.surrogate_gradient(
-        *of, surrogate="triangle", on_count=True
-    ),
+    "triangle_on_count": partial(rules.surrogate_gradient, surrogate="triangle", on_count=True),
     "resume": rules.resume,
-    "resume_even": lambda *of: rules.resume(*of, times="even"),
+    "resume_even": partial(rules.resume, times="even"),
     "psd": rules.psd,
     "span": rules.span,
-    "chronotron_e": lambda *of: rules.chronotron(*of, tau_q=5.0),
-    "chronotron_i": lambda *of: rules.chronotron(*of, rule="I", times="even"),
+    "chronotron_e": partial(rules.chronotron, tau_q=5.0),
+    "chronotron_i": partial(rules.chronotron, rule="I", times="even"),
     "stdp": rules.stdp,
     "mstdpet": rules.mstdpet,
 }
@@ -616,3 +627,9 @@ def test_learning_moves_the_count_the_right_way_on_the_very_trial(name: str, amo
                 right, wrong = right + toward, wrong + (not toward)
                 break
     assert right > 5 and right > 3 * wrong, (right, wrong)
+
+
+def test_the_description_of_a_neuron_of_the_package_holds_its_fields() -> None:
+    for neuron in (GNM(alpha=0.7, readout="D"), LIF(refractory=4), MST(tau_s=3.0)):
+        named = SimpleNamespace(name=type(neuron).__name__.lower(), **asdict(neuron))
+        assert spec(named) == neuron

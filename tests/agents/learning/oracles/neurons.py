@@ -7,7 +7,7 @@ trial of T bins costs O(T²) for the multi-spike tempotron.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,11 +90,9 @@ Spec = GNM | LIF | MST
 
 def spec(neuron: Any) -> Spec:
     """The description of a neuron of the package, taken from its name and fields."""
-    kinds: dict[str, type] = {"gnm": GNM, "lif": LIF, "mst": MST}
+    kinds: dict[str, type[Spec]] = {"gnm": GNM, "lif": LIF, "mst": MST}
     kind = kinds[neuron.name]
-    fields = {name: getattr(neuron, name) for name in kind.__dataclass_fields__}
-    made: Spec = kind(**fields)
-    return made
+    return kind(**{field.name: getattr(neuron, field.name) for field in fields(kind)})
 
 
 class Response(NamedTuple):
