@@ -147,11 +147,10 @@ def biexponential(slow: float, fast: float, n_bins: int) -> Floats:
 
 def traces(raster: NDArray[Any], response: ArrayLike) -> Floats:
     """Presynaptic traces x_i(t): each input spike adds the response from its own bin on, (T, N)."""
-    n_bins, n_inputs = raster.shape
-    x = np.zeros((n_bins, n_inputs))
+    n_bins = len(raster)
+    x = np.zeros(raster.shape)
     for s, i in zip(*np.nonzero(raster), strict=True):
-        for t in range(s, n_bins):
-            x[t, i] += np.asarray(response)[t - s]
+        x[s:, i] += np.asarray(response)[: n_bins - s]
     return x
 
 
@@ -215,11 +214,9 @@ def _mst(p: MST, raster: NDArray[Any], weights: ArrayLike) -> Response:
 
 def _unreset(neuron: Spec, raster: NDArray[Any], weights: ArrayLike) -> Floats:
     """U(t) = Σ_i w_i x_i(t): the double sum over all inputs so far, in every bin anew."""
-    current = input_current(raster, weights)
+    current = np.array(input_current(raster, weights))
     response = kernel(neuron, len(raster))
-    return np.array(
-        [sum(current[s] * response[t - s] for s in range(t + 1)) for t in range(len(raster))]
-    )
+    return np.array([np.dot(current[: t + 1], response[t::-1]) for t in range(len(raster))])
 
 
 def _crossings(X: Floats, threshold: float) -> tuple[Bools, Bools]:
