@@ -15,7 +15,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from markdown_docstrings import is_plain_data
-from public_names import Public, public_modules, public_names
+from public_names import ROOTS, Public, public_modules, public_names, unique
 from sphinx.application import Sphinx
 
 NAMESPACE = "gnm"
@@ -95,7 +95,7 @@ def picture(spec: EnvSpec, path: Path) -> None:
     env.close()
 
 
-def reference_page(module: Any, owned: list[Public], names: dict[str, Public]) -> str:
+def reference_page(module: Any, owned: list[Public]) -> str:
     """Summary of all that the module offers, then each object that is at home here."""
     title = module.__name__
     lines = [title, "=" * len(title), "", f".. py:module:: {title}", ""]
@@ -109,18 +109,33 @@ def reference_page(module: Any, owned: list[Public], names: dict[str, Public]) -
 
 def directive(public: Public) -> list[str]:
     value = public.value
+    if is_plain_data(value):
+        return [f".. autodata:: {public.path}", "   :no-value:", ""]
     if inspect.isclass(value):
         kind = "exception" if issubclass(value, BaseException) else "class"
         return [
             f".. auto{kind}:: {public.path}",
             "   :members:",
             f"   :inherited-members: {INHERITED_FROM_OTHERS}",
-            "   :exclude-members: parameters_type, state_type",
+            f"   :exclude-members: {', '.join(sorted(said_elsewhere(value)))}",
             "",
         ]
-    if is_plain_data(value):
-        return [f".. autodata:: {public.path}", "   :no-value:", ""]
     return [f".. autofunction:: {public.path}", ""]
+
+
+def said_elsewhere(cls: type) -> set[str]:
+    """Members that only the docstring of another library describes, on pages of its own."""
+    found = {"parameters_type", "state_type"}
+    for name in dir(cls):
+        documented = [b for b in cls.__mro__ if name in vars(b) and has_docstring(vars(b)[name])]
+        if documented and documented[0].__module__.split(".")[0] not in ROOTS:
+            found.add(name)
+    return found
+
+
+def has_docstring(member: Any) -> bool:
+    described = isinstance(member, property | classmethod | staticmethod) or callable(member)
+    return described and bool(getattr(member, "__doc__", None))
 
 
 def shorten_manual(obj: Any, lines: list[str]) -> list[str]:
@@ -150,13 +165,13 @@ def generate(app: Sphinx) -> None:
             picture(spec, page.with_suffix(".png"))
     names = public_names()
     owned: dict[str, list[Public]] = defaultdict(list)
-    for public in dict.fromkeys(names.values()):
+    for public in unique(names):
         owned[public.home].append(public)
     kept = {"index"}
     for module in public_modules():
         write(
             source / "reference" / f"{module.__name__}.rst",
-            reference_page(module, owned[module.__name__], names),
+            reference_page(module, owned[module.__name__]),
         )
         kept.add(module.__name__)
     for old in (source / "reference").glob("*.rst"):

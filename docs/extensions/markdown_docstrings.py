@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, get_origin
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
@@ -111,22 +111,48 @@ def link_names_of_page(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def is_plain_data(obj: Any) -> bool:
+    """Neither class nor function, compiled ones included: a number, a table, a type alias."""
+    if get_origin(obj) is not None:
+        return True
     return not (inspect.isclass(obj) or inspect.isroutine(obj) or hasattr(obj, "py_func"))
 
 
 def hand_over(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """`autodoc-process-docstring`: wrap the docstring in the directive."""
     shorten: Callable[[Any, list[str]], list[str]] | None = getattr(app, "shorten_manual", None)
-    if what == "data" and lines == inspect.cleandoc(type(obj).__doc__ or "").splitlines():
-        lines.clear()  # the docstring of int says nothing about a number
+    if what == "data" and lines and lines[0] == (obj.__doc__ or "").partition("\n")[0]:
+        lines.clear()  # what int says of itself is nothing about this number
     text = list(lines) if shorten is None else shorten(obj, list(lines))
     text = markdown(text, of_class=what in ("class", "exception"))
     lines[:] = [".. markdown::", "", *(f"   {line}" for line in text), ""]
+
+
+ARRAY = re.compile(
+    r"(?:numpy\.)?ndarray\[tuple\[(?:typing\.)?Any, \.\.\.\], (?:numpy\.)?dtype\[([^\[\]]+)\]\]"
+)
+
+
+def shorten_types(
+    app: Sphinx,
+    what: str,
+    name: str,
+    obj: Any,
+    options: Any,
+    signature: str | None,
+    result: str | None,
+) -> tuple[str | None, str | None]:
+    """`autodoc-process-signature`: NDArray[int8], as the source has it, for what it stands for."""
+
+    def shorter(text: str | None) -> str | None:
+        return None if text is None else ARRAY.sub(r"NDArray[\1]", text)
+
+    return shorter(signature), shorter(result)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     app.setup_extension("sphinx.ext.autodoc")
     app.add_directive("markdown", MarkdownDirective)
     app.connect("autodoc-process-docstring", hand_over)
+    app.connect("autodoc-process-signature", shorten_types)
     app.connect("doctree-read", link_names_of_page)
     return {"parallel_read_safe": True, "version": "1"}

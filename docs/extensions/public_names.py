@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from abc import ABC
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -67,31 +68,50 @@ def identity(value: Any) -> Any:
     return id(value) if hasattr(value, "__qualname__") and hasattr(value, "__module__") else None
 
 
-class SummaryDirective(Directive):
-    """A table of the public names of a module: each with the first sentence of its docstring.
-
-    Options in the argument: the module, then the names, all of them where none is given.
-    """
+class NamesDirective(Directive):
+    """Base of the tables of names: each a link, with the first sentence of its docstring."""
 
     required_arguments = 1
-    optional_arguments = 1
-    final_argument_whitespace = True
 
-    def run(self) -> list[nodes.Node]:
-        module = importlib.import_module(self.arguments[0])
-        wanted = self.arguments[1].split() if len(self.arguments) > 1 else module.__all__
-        targets: dict[str, str] = self.state.document.settings.env.app.public_targets
+    def table(self, entries: list[Public]) -> list[nodes.Node]:
         rows = []
-        for name in wanted:
-            value = getattr(module, name)
+        for public in entries:
+            value = public.value
             sentence = "" if is_plain_data(value) else first_sentence(value.__doc__)
-            path = targets[f"{module.__name__}.{name}"]
-            rows += [f"   * - :py:obj:`{name} <{path}>`", "     - .. markdown::", ""]
+            rows += [f"   * - :py:obj:`{public.name} <{public.path}>`", "     - .. markdown::", ""]
             rows += [f"          {sentence}", ""]
         lines = [".. list-table::", "   :widths: 30 70", "   :class: names", "", *rows]
         holder = nodes.Element()
-        self.state.nested_parse(StringList(lines, source=module.__name__), 0, holder)
+        self.state.nested_parse(StringList(lines, source=self.name), 0, holder)
         return list(holder.children)
+
+
+class SummaryDirective(NamesDirective):
+    """The public names of a module."""
+
+    def run(self) -> list[nodes.Node]:
+        module = importlib.import_module(self.arguments[0])
+        names = public_names()
+        return self.table([names[f"{module.__name__}.{name}"] for name in module.__all__])
+
+
+class KindDirective(NamesDirective):
+    """Every public class that has a base with the class in the argument: all neurons, all rules."""
+
+    def run(self) -> list[nodes.Node]:
+        names = public_names()
+        example = names[self.arguments[0]].value
+        base = [cls for cls in example.__mro__ if cls not in (example, ABC, object)][-1]
+        return self.table([p for p in unique(names) if is_kind(p.value, base)])
+
+
+def unique(names: dict[str, Public]) -> list[Public]:
+    """Each object once, in the order of the pages."""
+    return list(dict.fromkeys(names.values()))
+
+
+def is_kind(value: Any, base: type) -> bool:
+    return isinstance(value, type) and issubclass(value, base) and value is not base
 
 
 def collect(app: Sphinx) -> None:
@@ -107,5 +127,6 @@ def collect(app: Sphinx) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("summary", SummaryDirective)
+    app.add_directive("all-like", KindDirective)
     app.connect("builder-inited", collect, priority=100)
     return {"parallel_read_safe": True, "version": "1"}
