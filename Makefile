@@ -79,7 +79,7 @@ $(VENV)/.for-train: $(NEEDS)
 
 $(VENV)/.for-test: $(NEEDS)
 	@echo "Installing what the tests need into $(VENV); with torch this takes minutes ..."
-	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,docs,dev]"
+	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,docs,dev]"
 	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $(VENV)/.for-docs $@
 
 $(VENV)/.for-benchmark: $(NEEDS)

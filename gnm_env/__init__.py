@@ -10,6 +10,7 @@ from gnm_env.stream_env import PatternStreamEnv
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 from gnm_env.trial_env import PatternTrialEnv
+from gnm_env.trials import Trials
 
 __all__ = [
     "PatternStreamEnv",
@@ -17,6 +18,7 @@ __all__ = [
     "Patterns",
     "Task",
     "Trial",
+    "Trials",
     "draw_trial",
 ]
 

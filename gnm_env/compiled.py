@@ -47,11 +47,13 @@ def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any
     This is how one loop serves every neuron and every rule: the template calls `step`, and each
     neuron binds its own. `label` names the combination and tells the results in the cache apart.
     """
+    template = getattr(template, "py_func", template)
     function = types.FunctionType(
         template.__code__,
         {**template.__globals__, **bindings},
         f"{template.__name__}_{label}",
         template.__defaults__,
+        template.__closure__,
     )
     function.__qualname__ = function.__name__
     function.__doc__ = template.__doc__

@@ -5,6 +5,9 @@ end of the last; `target` (2K + 1) the output spikes that each segment is owed: 
 with even numbers are noise, some of them empty; those with odd numbers are presentations. Counts of
 output spikes, the error trace, dense feedback, the survival rule and the question of who owns a bin
 all follow from this one list.
+
+Where only the label of a trial is known and not where it was earned, there is one segment, the
+whole trial, and it is owed the label. So the label is the sum of `target` in every trial.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.learning.rule import Outcome, Rule, RuleParameters
+from agents.learning.rule import Rule, RuleParameters, decay_option
 from agents.simd import like, load, store, where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled
@@ -18,16 +18,7 @@ _INSERTED = 48
 
 
 @compiled
-def correction(outcome: Outcome) -> Any:
-    """+1 where more output was owed, −1 where less, 0 where the sum was right."""
-    zero = like(0.0, outcome.emitted)
-    return where(
-        outcome.emitted < outcome.label, 1.0, where(outcome.emitted > outcome.label, -1.0, zero)
-    )
-
-
-@compiled
-def teaching_signal(mode: tuple[int, ...], V: Any, E: Any) -> Any:
+def teaching_signal(static: tuple[int, ...], V: Any, E: Any) -> Any:
     """ε_i = Σ_t x_i(t) V(t)."""
     return V
 
@@ -35,12 +26,12 @@ def teaching_signal(mode: tuple[int, ...], V: Any, E: Any) -> Any:
 @compiled
 def weight_change(
     p: RuleParameters,
-    mode: tuple[int, ...],
+    static: tuple[int, ...],
     sign: Any,
     eligibility: NDArray[np.float64],
 ) -> None:
     """Δ_i = ±λ for every i with ε_i strictly above the (k+1)-th largest ε, else 0; in place."""
-    count = mode[0]
+    count = static[0]
     step = sign * p.learning_rate
     if count >= len(eligibility):
         for i in range(len(eligibility)):
@@ -123,16 +114,17 @@ class AggregateLabel(Rule):
             k = round(fraction · N); 0.1 is the paper's ninth decile.
         trace_decay: decay factor per bin of the presynaptic trace in place of the neuron's own
             response (None); 0 reads the paper's ∫ I_i V dt literally.
+        decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
     """
 
     learning_rate: float = 1e-4
     momentum: float = 0.2
     fraction: float = 0.1
     trace_decay: float | None = None
+    decay_trials: int | None = decay_option()
 
     name: ClassVar[str] = "all"
-    uses_error: ClassVar[bool] = False
-    correction: ClassVar[Any] = correction
+    feedback: ClassVar[str] = "sign"
     teaching_signal: ClassVar[Any] = teaching_signal
     weight_change: ClassVar[Any] = weight_change
 
@@ -140,7 +132,7 @@ class AggregateLabel(Rule):
         super().__post_init__()
         real("fraction", self.fraction, low=0.0, high=1.0)
 
-    def mode(self, n_inputs: int) -> tuple[int, ...]:
+    def static(self, n_inputs: int) -> tuple[int, ...]:
         count = round(self.fraction * n_inputs)
         if count == 0:
             raise ValueError(

@@ -21,7 +21,6 @@ from agents import (
     AggregateLabel,
     ErrorTrace,
     NeuronAgent,
-    checkpoint,
     load_checkpoint,
     noisy_performance,
 )
@@ -163,9 +162,19 @@ def test_a_path_relative_to_the_working_folder_works(
     assert np.array_equal(NeuronAgent.load("agent").weights, small_agent().weights)
 
 
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "disk full"), KeyboardInterrupt()])
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (OSError(errno.ENOSPC, "disk full"), ValueError),
+        (OSError(errno.EACCES, "other"), OSError),
+        (KeyboardInterrupt(), KeyboardInterrupt),
+    ],
+)
 def test_a_failure_in_the_middle_leaves_the_old_file_and_no_litter(
-    saved: Path, error: BaseException, monkeypatch: pytest.MonkeyPatch
+    saved: Path,
+    error: BaseException,
+    raised: type[BaseException],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     before = saved.read_bytes()
 
@@ -175,7 +184,7 @@ def test_a_failure_in_the_middle_leaves_the_old_file_and_no_litter(
         raise error
 
     monkeypatch.setattr(np, "savez", fail)
-    with pytest.raises(type(error)):
+    with pytest.raises(raised):
         small_agent(seed=1).save(saved)
     assert saved.read_bytes() == before
     assert [p.name for p in saved.parent.iterdir()] == [saved.name]
@@ -197,7 +206,7 @@ def test_a_folder_that_cannot_be_written_is_refused(
     def denied(*args: Any, **keywords: Any) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr(checkpoint.tempfile, "mkstemp", denied)
+    monkeypatch.setattr(os, "open", denied)
     with pytest.raises(ValueError, match="Permission denied; choose a folder"):
         small_agent().save(tmp_path / "agent")
 
