@@ -11,7 +11,10 @@ from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 from gnm_env.trial_env import PatternTrialEnv
 
+__version__ = "0.1.0"
+
 __all__ = [
+    "__version__",
     "PatternStreamEnv",
     "PatternTrialEnv",
     "Patterns",
