@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.training.binding import loops
+from agents.training.compile_errors import explained
 from agents.training.source import Source
 from agents.training.streams import Learning, Models
 
@@ -113,13 +115,19 @@ class AgentBatch:
         Returns, per agent, the number of trials answered wrongly and Σ |label − emitted|.
         """
         run = getattr(self._loops, f"train_{self._source.kind}")
-        wrong, absolute = run(rng, ahead, trials, self._models, self._learning, self._trials)
+        try:
+            wrong, absolute = run(rng, ahead, trials, self._models, self._learning, self._trials)
+        except NumbaError as error:
+            raise explained(error, self._agents[0].model, self._agents[0].rule) from None
         self._trials += trials
         return self._per_agent(wrong).astype(np.int64), self._per_agent(absolute)
 
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
         """Bins that each agent survives on the endless stream of `rng`, at most `cap`."""
-        bins = self._loops.survive(rng, self._source.stream(), cap, self._models)
+        try:
+            bins = self._loops.survive(rng, self._source.stream(), cap, self._models)
+        except NumbaError as error:
+            raise explained(error, self._agents[0].model) from None
         return self._per_agent(bins).astype(np.int64)
 
     def answer(self, rng: Generator, trials: int) -> Answers:

@@ -8,7 +8,7 @@ from typing import Any
 
 from agents.learning.rule import CORRECTIONS, Rule
 from agents.learning.teaching import replay_template
-from agents.model import Model
+from agents.model import Model, threshold_name
 from agents.training import change
 from agents.training.batches import draw_batch, take_batch
 from agents.training.slots import LEARN_WIDTH
@@ -126,14 +126,3 @@ def _change(
     epsilon = specialise(change.epsilon_template, alone, **names, teach=own) if rule.teach else own
     learn_alone = specialise(change.learn_alone_template, alone, **names, epsilon=epsilon)
     return specialise(change.taught_change_template, together, **of_rule, learn_alone=learn_alone)
-
-
-def threshold_name(parameters: Any) -> str:
-    """The name of the readout's threshold among the parameters of a neuron."""
-    for name in ("theta_r", "theta"):
-        if name in parameters._fields:
-            return name
-    raise ValueError(
-        f"the parameters of a neuron must hold its threshold under the name theta or theta_r, "
-        f"got {', '.join(parameters._fields)}"
-    )

@@ -161,8 +161,8 @@ def test_scoring_changes_nothing() -> None:
         ({"runs": 0}, "runs must be >= 1, got 0"),
         ({"cap": 0}, "cap must be >= 1, got 0"),
         ({"seed": -1}, "seed must be >= 0, got -1"),
-        ({"threads": 0}, "threads must be >= 1, got 0"),
-        ({"threads": 0, "shared": False}, "threads must be >= 1, got 0"),
+        ({"threads": 0}, "threads must be in 1 … 1024, got 0"),
+        ({"threads": 0, "shared": False}, "threads must be in 1 … 1024, got 0"),
     ],
 )
 def test_numbers_out_of_range_are_refused(keywords: dict[str, Any], message: str) -> None:
