@@ -114,7 +114,7 @@ def find(kind: str, spec: str) -> type:
                 "yours is given as module:Class or file.py:Class"
             )
         return known[spec]
-    module = _module(place)
+    module = load_module(place)
     cls = getattr(module, class_name, None)
     if not isinstance(cls, type):
         raise ValueError(f"{place} has no class {class_name!r}")
@@ -123,7 +123,7 @@ def find(kind: str, spec: str) -> type:
     return cls
 
 
-def _module(place: str) -> Any:
+def load_module(place: str) -> Any:
     """The module named `place`, or that of the file `place`."""
     if not place.endswith(".py"):
         sys.path.insert(0, "")  # as `python -m` does: modules of the folder one stands in
