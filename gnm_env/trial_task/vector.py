@@ -109,14 +109,12 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         return self.task.background_bins + self.task.pattern_bins * most_presentations
 
     def _config(self) -> Config:
-        return (
-            super()
-            ._config()
-            ._replace(
-                most=self.max_output if self._graded else 1.0,
-                feedback=FEEDBACK_NUMBER[self.feedback],
-                tolerance=self.tolerance,
-            )
+        same = super()._config()
+        return same._replace(
+            most=self.max_output if self._graded else 1.0,
+            feedback=FEEDBACK_NUMBER[self.feedback],
+            tolerance=self.tolerance,
+            tells_ends=self._tells_ends,
         )
 
     def _new_state(self, growing: Growing) -> Any:
