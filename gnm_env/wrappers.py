@@ -197,7 +197,7 @@ def _rate(env: Any) -> float:
     source: Any = env.unwrapped
     if isinstance(source, VectorEnv) and getattr(source, "envs", None):
         # Gymnasium's own vector environments keep their parts to themselves.
-        source = source.envs[0].unwrapped
+        source = source.envs[0].unwrapped  # type: ignore[attr-defined]
     task, trials = getattr(source, "task", None), getattr(source, "trials", None)
     if task is not None:
         return float(task.rate)
