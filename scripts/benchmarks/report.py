@@ -8,6 +8,7 @@ from itertools import groupby
 from statistics import median
 from typing import Any
 
+from agents.experiments.progress import duration
 from agents.memory import (
     BYTES_AT_LEAST,
     BYTES_PER_AGENT,
@@ -17,7 +18,6 @@ from agents.memory import (
 )
 from agents.neuron_lanes import LANES_PER_BLOCK
 from benchmarks.rows import BEST_ONLY, MET, MISSED, Curve, Findings, Row, Target
-from progress import duration
 
 HEADINGS = ("", "median", "unit", "min … max", "best", "× as fast", "core", "target", "reached")
 SHARED = 0.95
