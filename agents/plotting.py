@@ -188,9 +188,10 @@ def draw_raster(axes: Axes, trial: Trial) -> None:
     bins, channels = np.nonzero(trial.dense())
     axes.plot(bins + 0.5, channels, "|", color="0.15", markersize=3, markeredgewidth=0.8)
     axes.set(xlim=(0, trial.n_bins), ylim=(-1, trial.n_inputs), ylabel="input channel")
-    for onset, class_, owed in zip(trial.onsets, trial.classes, trial.targets, strict=True):
+    middles = (trial.onsets + trial.ends) / 2
+    for middle, class_, owed in zip(middles, trial.classes, trial.targets, strict=True):
         axes.annotate(
-            f"class {class_}, owes {owed}", (onset + trial.pattern_bins / 2, 1.01),
+            f"class {class_}, owes {owed}", (middle, 1.01),
             xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=8,
             color=class_colour(class_),
         )  # fmt: skip

@@ -12,7 +12,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-_REGISTERED: dict[str, dict[str, type]] = {"neuron": {}, "rule": {}, "agent": {}}
+_REGISTERED: dict[str, dict[str, type]] = {
+    "neuron": {},
+    "network": {},
+    "rule": {},
+    "agent": {},
+}
 
 
 def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
@@ -21,7 +26,7 @@ def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
     A class without a name, whose bases have none either, is a base of others and is not entered.
 
     Args:
-        kind: "neuron", "rule" or "agent".
+        kind: "neuron", "network", "rule" or "agent".
         cls: the class; defining one of the same module and name again replaces the earlier one, as
             running the cell of a notebook again does.
         step: attributes that make the class differ from its parent.
@@ -53,6 +58,11 @@ def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
     _REGISTERED[kind][name] = cls
 
 
+def known(kind: str, name: str) -> Any:
+    """The class of that kind and name; None if there is none."""
+    return _complete(kind).get(name)
+
+
 def home(cls: type) -> str:
     """Where a class is defined, as "module:Class"."""
     return f"{cls.__module__}:{cls.__qualname__}"
@@ -61,6 +71,11 @@ def home(cls: type) -> str:
 def neurons() -> dict[str, type]:
     """All neurons defined so far, by name."""
     return _complete("neuron")
+
+
+def networks() -> dict[str, type]:
+    """All networks defined so far, by name."""
+    return _complete("network")
 
 
 def rules() -> dict[str, type]:
@@ -83,6 +98,11 @@ def _complete(kind: str) -> dict[str, type]:
 def find_neuron(spec: str) -> type:
     """See `find`."""
     return find("neuron", spec)
+
+
+def find_model(spec: str) -> type:
+    """A neuron or a network; see `find`."""
+    return find("network" if spec in networks() else "neuron", spec)
 
 
 def find_rule(spec: str) -> type:

@@ -3,18 +3,40 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+import itertools
+import math
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gnm_env.checks import real, whole
+from gnm_env.checks import (
+    MAX_INPUTS,
+    MAX_SEED,
+    MAX_TARGET,
+    real,
+    require_memory,
+    shown,
+    whole,
+    whole_array,
+)
 from gnm_env.compiled import compiled
 
 MAX_MEAN_BINS = 100_000_000
 """Longest mean trial that a Task accepts, in bins: beyond it one draw would fill the memory."""
+
+MAX_CLASSES = 1_000_000
+"""Most classes of patterns."""
+
+
+_LIMITS = {
+    "n_inputs": MAX_INPUTS,
+    "pattern_bins": MAX_MEAN_BINS,
+    "n_classes": MAX_CLASSES,
+    "background_bins": MAX_MEAN_BINS,
+}
 
 
 @dataclass(frozen=True)
@@ -37,6 +59,8 @@ class Task:
         jitter_bins: j; each spike of each occurrence is moved by an integer uniform on −j … j and
             held at the pattern's first or last bin where that would carry it outside.
         deletion: probability that a spike of an occurrence is dropped.
+        rates: in place of `rate` one probability for each channel, say those of a recording
+            (`Trials.rates`); `rate` is then their mean.
     """
 
     n_inputs: int = 100
@@ -49,17 +73,21 @@ class Task:
     onset_probability: float = 0.01
     jitter_bins: int = 0
     deletion: float = 0.0
+    rates: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, value: Any) -> None:
             object.__setattr__(self, name, value)
 
-        for name in ("n_inputs", "pattern_bins", "n_classes", "background_bins"):
-            put(name, whole(name, getattr(self, name), low=1))
+        for name, high in _LIMITS.items():
+            put(name, whole(name, getattr(self, name), low=1, high=high))
+        put("rates", self._checked_rates())
+        if self.rates is not None:
+            put("rate", math.fsum(self.rates) / self.n_inputs)
         for name in ("rate", "onset_probability", "deletion"):
             put(name, real(name, getattr(self, name), low=0.0, high=1.0))
         put("mean_occurrences", real("mean_occurrences", self.mean_occurrences, low=0.0))
-        put("jitter_bins", whole("jitter_bins", self.jitter_bins, low=0))
+        put("jitter_bins", whole("jitter_bins", self.jitter_bins, low=0, high=MAX_MEAN_BINS))
         put("targets", self._checked_targets())
         mean_bins = self.background_bins + self.mean_pattern_bins
         if mean_bins > MAX_MEAN_BINS:
@@ -74,14 +102,35 @@ class Task:
         if targets is None:
             return tuple(range(1, self.n_classes + 1))
         if isinstance(targets, str) or not isinstance(targets, Iterable):
-            raise ValueError(f"targets must be a sequence of whole numbers, got {targets!r}")
-        checked = tuple(whole(f"targets[{c}]", t, low=0) for c, t in enumerate(targets))
+            raise ValueError(f"targets must be a sequence of whole numbers, got {shown(targets)}")
+        given = list(itertools.islice(targets, self.n_classes + 1))  # it may be endless
+        checked = tuple(
+            whole(f"targets[{c}]", t, low=0, high=MAX_TARGET) for c, t in enumerate(given)
+        )
         if len(checked) != self.n_classes:
             raise ValueError(
                 f"targets must have one entry per class, n_classes = {self.n_classes}, "
-                f"got {len(checked)}: {checked}"
+                f"got {len(targets) if isinstance(targets, Sized) else 'another number'}"
             )
         return checked
+
+    def _checked_rates(self) -> tuple[float, ...] | None:
+        rates = self.rates
+        if rates is None:
+            return None
+        if isinstance(rates, str) or not isinstance(rates, Iterable):
+            raise ValueError(f"rates must be a sequence of probabilities, got {shown(rates)}")
+        given = list(itertools.islice(rates, self.n_inputs + 1))
+        if len(given) != self.n_inputs:
+            raise ValueError(
+                f"rates must have one entry per channel, n_inputs = {self.n_inputs}, "
+                f"got {len(rates) if isinstance(rates, Sized) else 'another number'}"
+            )
+        return tuple(real(f"rates[{i}]", p, low=0.0, high=1.0) for i, p in enumerate(given))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Through the constructor, so that what is unpickled is checked."""
+        return Task, tuple(getattr(self, field.name) for field in fields(Task))
 
     @property
     def owed(self) -> tuple[int, ...]:
@@ -125,9 +174,11 @@ class Task:
         return task
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Patterns:
     """C fixed spatio-temporal patterns. Make them with `Patterns.draw` or `Patterns.from_dense`.
+
+    The constructor copies the arrays, and raises ValueError if they do not fit each other.
 
     Attributes:
         channels: int32 (events,), the channel of each spike; ascending within a bin.
@@ -141,29 +192,56 @@ class Patterns:
     shape: tuple[int, int, int]
 
     def __post_init__(self) -> None:
-        for array in (self.channels, self.offsets):
-            array.setflags(write=False)
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Unpickled arrays can be written to until told otherwise."""
-        self.__dict__.update(state)
-        self.__post_init__()
+        if not isinstance(self.shape, (tuple, list)) or len(self.shape) != 3:
+            raise ValueError(f"shape must be (classes, bins, channels), got {shown(self.shape)}")
+        limits = (MAX_CLASSES, MAX_MEAN_BINS, MAX_INPUTS)
+        axes = ("classes", "bins", "channels")
+        put("shape", tuple(map(whole, axes, self.shape, (1, 1, 1), limits)))
+        channels, offsets = checked_events(self.channels, self.offsets, self.shape[2])
+        if len(offsets) != self.shape[0] * self.shape[1] + 1:
+            raise ValueError(
+                f"offsets must have one entry for each of the classes · bins = "
+                f"{self.shape[0] * self.shape[1]:,} bins and one more, got {len(offsets):,}"
+            )
+        for name, array in (("channels", channels), ("offsets", offsets)):
+            array.setflags(write=False)
+            put(name, array)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Through the constructor, so that what is unpickled is checked."""
+        return Patterns, (self.channels, self.offsets, self.shape)
 
     @classmethod
     def draw(cls, task: Task, seed: int) -> Patterns:
-        """Draw patterns of `task` at random: each bit is 1 with probability `task.rate`.
+        """Draw patterns of `task` at random: each bit is 1 with the probability `task.rate`.
+
+        With `task.rates`, each channel has its own.
 
         The generator is default_rng((seed, 1)), so that equal seeds mean equal patterns everywhere
         and a stream with the same seed shares no bits with them.
         """
-        seed = whole("pattern seed", seed, low=0)
+        if not isinstance(task, Task):
+            raise ValueError(f"task must be a gnm_env.Task, got {shown(task)}")
+        seed = whole("pattern seed", seed, low=0, high=MAX_SEED)
         shape = (task.n_classes, task.pattern_bins, task.n_inputs)
-        return cls.from_dense(np.random.default_rng((seed, 1)).random(shape) < task.rate)
+        require_memory(
+            f"drawing patterns of shape {shape}",
+            9.0 * math.prod(shape),
+            "lower n_classes, pattern_bins or n_inputs",
+        )
+        rates = task.rate if task.rates is None else np.array(task.rates)
+        return cls.from_dense(np.random.default_rng((seed, 1)).random(shape) < rates)
 
     @classmethod
     def from_dense(cls, array: ArrayLike) -> Patterns:
         """Patterns from a binary array of shape (C, M, N); ValueError if it is anything else."""
-        bits = np.asarray(array)
+        try:
+            bits = np.asarray(array)
+        except (TypeError, ValueError):
+            raise ValueError("patterns must all have one shape (bins, channels)") from None
         if bits.ndim != 3 or 0 in bits.shape:
             raise ValueError(
                 "patterns must have shape (classes, bins, channels) with no empty axis, "
@@ -176,6 +254,12 @@ class Patterns:
         """The patterns as a new bool array of shape (C, M, N)."""
         return dense(self.channels, self.offsets, self.shape[2]).reshape(self.shape).view(np.bool_)
 
+    def __repr__(self) -> str:
+        classes, bins, channels = self.shape
+        return (
+            f"Patterns({classes} of {bins} bins, {channels} channels, {len(self.channels)} spikes)"
+        )
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Patterns):
             return NotImplemented
@@ -187,6 +271,36 @@ class Patterns:
 
     def __hash__(self) -> int:
         return hash((self.shape, self.channels.tobytes(), self.offsets.tobytes()))
+
+
+def checked_events(
+    channels: Any, offsets: Any, n_inputs: int
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Copies of channels and offsets that compiled code may rely on; ValueError if they are not.
+
+    Offsets begin with 0, never fall and end with the number of channels; channels lie in
+    0 … n_inputs − 1 and ascend within a bin.
+    """
+    spikes = whole_array("channels", channels, 0, n_inputs - 1, np.int32)
+    ends = whole_array("offsets", offsets, 0, len(spikes))
+    if len(ends) < 2 or ends[0] != 0 or ends[-1] != len(spikes):
+        raise ValueError(
+            "offsets must have one entry more than there are bins (>= 1), from 0 to the number of "
+            f"channels, {len(spikes)}, got {shown(ends.tolist()[:8])}"
+        )
+    if np.any(np.diff(ends) < 0):
+        bin_ = int(np.argmax(np.diff(ends) < 0))
+        raise ValueError(f"offsets must never fall, got {ends[bin_]}, {ends[bin_ + 1]}")
+    ascends = np.diff(spikes) > 0
+    begins = ends[(ends > 0) & (ends < len(spikes))]
+    ascends[begins - 1] = True
+    if not ascends.all():
+        bin_ = int(np.searchsorted(ends, int(np.argmin(ascends)), side="right")) - 1
+        raise ValueError(
+            "channels must ascend within a bin, "
+            f"got {shown(spikes[ends[bin_] : ends[bin_ + 1]].tolist())} in bin {bin_}"
+        )
+    return spikes, ends
 
 
 def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
@@ -205,7 +319,13 @@ def dense(
     channels: NDArray[Any], offsets: NDArray[Any], n_inputs: int, silent_bins: int = 0
 ) -> NDArray[np.int8]:
     """The raster of sparse events, int8 (bins + silent_bins, channels), as a new array."""
-    raster = np.zeros((len(offsets) - 1 + silent_bins, n_inputs), np.int8)
+    bins = len(offsets) - 1 + silent_bins
+    require_memory(
+        f"a raster of {bins:,} bins and {n_inputs:,} channels",
+        float(bins * n_inputs),
+        "take fewer bins or channels",
+    )
+    raster = np.zeros((bins, n_inputs), np.int8)
     _scatter(channels, offsets, raster)
     return raster
 
@@ -234,16 +354,22 @@ class TaskArrays(NamedTuple):
     targets: NDArray[np.int64]
     pattern_channels: NDArray[np.int32]
     pattern_offsets: NDArray[np.int64]
+    kept: NDArray[np.float64]
+    """Where channels have rates of their own, (N,): each over the largest, to which `hazard`
+    belongs; the share of its spikes that are kept. Else empty."""
 
 
 def task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
     """Task and patterns for compiled code; ValueError if they do not fit each other."""
+    for name, value, kind, remedy in (
+        ("task", task, Task, "use Task(…)"),
+        ("patterns", patterns, Patterns, "use Patterns.from_dense(array)"),
+    ):
+        if not isinstance(value, kind):
+            raise ValueError(
+                f"{name} must be gnm_env.{kind.__name__}, got {shown(value)}; {remedy}"
+            )
     expected = (task.n_classes, task.pattern_bins, task.n_inputs)
-    if not isinstance(patterns, Patterns):
-        raise ValueError(
-            f"patterns must be gnm_env.Patterns, got {type(patterns).__name__}; "
-            "use Patterns.from_dense(array)"
-        )
     if patterns.shape != expected:
         raise ValueError(
             f"patterns must have shape (n_classes, pattern_bins, n_inputs) = {expected} as the "
@@ -254,6 +380,15 @@ def task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
 
 @functools.lru_cache(maxsize=64)
 def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
+    # Buffers of channels, which grow by doubling, and of offsets.
+    bins = task.background_bins + task.mean_pattern_bins
+    require_memory(
+        f"a trial of {bins:,.0f} bins on average with {task.rate * task.n_inputs:g} spikes in each",
+        (8.0 * task.rate * task.n_inputs + 16.0) * bins,
+        "lower background_bins, pattern_bins, mean_occurrences, n_inputs or rate",
+    )
+    rates = np.array([] if task.rates is None else task.rates, np.float64)
+    most = task.rate if task.rates is None else max(task.rates)
     with np.errstate(divide="ignore"):
         return TaskArrays(
             task.n_inputs,
@@ -263,11 +398,12 @@ def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
             task.jitter_bins,
             task.deletion,
             task.mean_occurrences,
-            float(-np.log1p(-task.rate)),
+            float(-np.log1p(-most)),
             float(-np.log1p(-task.onset_probability)),
             np.array(task.owed, np.int64),
             # Copies, which can be written to as those that pickle makes can: compiled code is made
             # anew for read-only arrays.
             patterns.channels.copy(),
             patterns.offsets.copy(),
+            rates / most if most > 0.0 else rates,
         )

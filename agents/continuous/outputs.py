@@ -46,12 +46,12 @@ def at_edges(agent: ContinuousAgent, trial: Trial) -> Amounts:
 
 def in_occurrences(trial: Trial, S: Amounts) -> Amounts:
     """S given in each occurrence, (…, K), from S at the edges, (…, T + 1)."""
-    return S[..., trial.onsets + trial.pattern_bins] - S[..., trial.onsets]
+    return S[..., trial.ends] - S[..., trial.onsets]
 
 
 def in_noise(trial: Trial, S: Amounts) -> Amounts:
     """S given in each stretch of noise, (…, K + 1), some of them empty; `S` as for occurrences."""
-    begins = np.concatenate([[0], trial.onsets + trial.pattern_bins])
+    begins = np.concatenate([[0], trial.ends])
     ends = np.concatenate([trial.onsets, [trial.n_bins]])
     return S[..., ends] - S[..., begins]
 

@@ -9,12 +9,12 @@ from agents import registry
 
 def neuron_class(spec: str) -> Any:
     """The class of a neuron: a registered name, "module:Class" or "path/to/file.py:Class"."""
-    return _find("neuron", spec)
+    return registry.find_model(spec)
 
 
 def rule_class(spec: str) -> Any:
     """The class of a learning rule, likewise."""
-    return _find("rule", spec)
+    return registry.find_rule(spec)
 
 
 def default_rule(neuron: Any) -> str:
@@ -54,25 +54,11 @@ def new_agent(
     return agent_class(neuron, rule, n_inputs, seed, initial_weight, **bounds)
 
 
-def _find(kind: str, spec: str) -> Any:
-    return _STAND_IN(kind).get(spec) or registry.find(kind, spec)
-
-
-def _STAND_IN(kind: str) -> dict[str, Any]:
-    from agents.continuous import ContinuousGNM
-    from agents.network import BackPropagation, Network
-    from agents.neuron_agent import NEURONS, RULES
-
-    if kind == "neuron":
-        return {**NEURONS, "continuous": ContinuousGNM, "network": Network}
-    return {**RULES, "bp": BackPropagation}
-
-
 def neurons() -> dict[str, Any]:
     """All neurons, by name."""
-    return _STAND_IN("neuron") | registry.neurons()
+    return registry.neurons() | registry.networks()
 
 
 def rules() -> dict[str, Any]:
     """All learning rules, by name."""
-    return _STAND_IN("rule") | registry.rules()
+    return registry.rules()

@@ -239,9 +239,10 @@ def _print_amounts(axis: Axes, trial: Trial, course: Course) -> None:
     """Shade each presentation and print the S given in it, of several runs in the first."""
     shade(axis, trial)
     amounts = np.atleast_2d(given(trial, course))[0]
-    for onset, class_, amount in zip(trial.onsets, trial.classes, amounts, strict=True):
+    middles = (trial.onsets + trial.ends) / 2
+    for middle, class_, amount in zip(middles, trial.classes, amounts, strict=True):
         axis.text(
-            onset + trial.pattern_bins / 2, 0.97 * axis.get_ylim()[1],
+            middle, 0.97 * axis.get_ylim()[1],
             f"class {class_}: $S$ = {amount:.2f}", ha="center", va="top", fontsize=7,
         )  # fmt: skip
 

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from agents.experiments.design import Block
-from agents.many import thread_count
+from agents.training.many import thread_count
 
 CONNECTION_SECONDS = 5
 """How long a scheduler may take to answer."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 import pickle
 from dataclasses import FrozenInstanceError
 from typing import Any
@@ -43,6 +45,13 @@ class TestTask:
         with pytest.raises(FrozenInstanceError):
             Task().rate = 0.5  # type: ignore[misc]
 
+    def test_survives_pickling_and_is_checked_on_the_way(self) -> None:
+        task = Task(n_classes=2, targets=(0, 3), jitter_bins=2)
+        assert pickle.loads(pickle.dumps(task)) == task == copy.deepcopy(task)
+        rebuild, fields = task.__reduce__()
+        with pytest.raises(ValueError, match="n_inputs must be >= 1"):
+            rebuild(0, *fields[1:])
+
     def test_silence_scores_what_the_arithmetic_says(self) -> None:
         assert Task().silent_score == pytest.approx(148.0)
         assert Task(onset_probability=1.0, pattern_bins=7).silent_score == 6.0
@@ -76,6 +85,15 @@ class TestTask:
             ("targets", (1.5,), "whole number, got 1.5"),
             ("targets", 1, "sequence of whole numbers, got 1"),
             ("targets", "1", "sequence of whole numbers, got '1'"),
+            ("targets", (2**62,), "at most 1,000,000,000, got 4611686018427387904"),
+            ("targets", itertools.count(), "one entry per class"),
+            ("n_inputs", 2**40, "at most 100,000,000"),
+            pytest.param("n_inputs", 10**5000, "at most 100,000,000, got a value", id="digits"),
+            ("n_classes", 10**9, "at most 1,000,000"),
+            ("pattern_bins", 2**62, "at most 100,000,000"),
+            ("background_bins", 2**62, "at most 100,000,000"),
+            ("jitter_bins", 2**62, "at most 100,000,000"),
+            pytest.param("mean_occurrences", 10**400, "finite", id="beyond a float"),
         ],
     )
     def test_a_field_out_of_range_is_named(self, field: str, value: Any, why: str) -> None:
@@ -119,9 +137,54 @@ class TestPatterns:
 
     def test_survive_pickling(self) -> None:
         patterns = Patterns.draw(Task(n_classes=2), 0)
-        copy = pickle.loads(pickle.dumps(patterns))
-        assert copy == patterns
-        assert not copy.channels.flags.writeable
+        again = pickle.loads(pickle.dumps(patterns))
+        assert again == patterns
+        assert not again.channels.flags.writeable
+
+    def test_do_not_hold_on_to_what_they_are_given(self) -> None:
+        channels = np.array([0, 2], np.int64)
+        patterns = Patterns(channels, [0, 1, 2], (1, 2, 3))  # type: ignore[arg-type]
+        channels[:] = 10**9
+        assert patterns.channels.tolist() == [0, 2] and patterns.channels.dtype == np.int32
+        assert channels.flags.writeable
+
+    @pytest.mark.parametrize(
+        ("channels", "offsets", "shape", "why"),
+        [
+            ([0, 3], [0, 1, 2], (1, 2, 3), "channels must lie in 0 … 2, got 3"),
+            ([0, -1], [0, 1, 2], (1, 2, 3), "channels must lie in 0 … 2, got -1"),
+            ([2, 0], [0, 2, 2], (1, 2, 3), "ascend within a bin, got [2, 0] in bin 0"),
+            ([0, 1.5], [0, 1, 2], (1, 2, 3), "channels must be whole numbers"),
+            ([0, 1], [0, 1, 3], (1, 2, 3), "offsets must lie in 0 … 2"),
+            ([0, 1], [0, 1, 1], (1, 2, 3), "offsets must have one entry more"),
+            ([0, 1], [0, 2], (1, 2, 3), "classes · bins = 2 bins and one more, got 2"),
+            ([0, 1], [0, 2, 1, 2], (1, 3, 3), "offsets must never fall"),
+            ([0, 1], [0, 1, 2], (1, 2), "shape must be (classes, bins, channels)"),
+            ([0, 1], [0, 1, 2], None, "shape must be (classes, bins, channels)"),
+            ([0, 1], [0, 1, 2], (1, 2, 2**40), "channels must be at most"),
+            ([0, 1], [0, 1, 2], (2**40, 2, 2), "classes must be at most"),
+            ([0, 1], [0, 1, 2], (1.0, 2, 2), "classes must be a whole number"),
+            ("ab", [0, 1, 2], (1, 2, 3), "row of whole numbers"),
+        ],
+    )
+    def test_whose_arrays_do_not_fit_are_refused(
+        self, channels: Any, offsets: Any, shape: Any, why: str
+    ) -> None:
+        with pytest.raises(ValueError) as refusal:
+            Patterns(channels, offsets, shape)
+        assert why in str(refusal.value) and "\n" not in str(refusal.value)
+
+    def test_too_large_for_the_memory_are_refused_before_they_are_drawn(self) -> None:
+        with pytest.raises(ValueError, match=r"drawing patterns of shape .* needs .* GiB"):
+            Patterns.draw(Task(n_inputs=10**8, pattern_bins=10**6), 0)
+
+    def test_must_be_drawn_for_a_task(self) -> None:
+        with pytest.raises(ValueError, match=r"task must be a gnm_env\.Task, got None"):
+            Patterns.draw(None, 0)  # type: ignore[arg-type]
+
+    def test_show_themselves_in_a_line(self) -> None:
+        shown = repr(Patterns.draw(Task(n_classes=2), 0))
+        assert "\n" not in shown and "2 of 50 bins, 100 channels" in shown
 
     @pytest.mark.parametrize("shape", [(50, 100), (1, 0, 100), (0, 50, 100), (1, 50, 0), ()])
     def test_of_another_number_of_axes_are_refused(self, shape: tuple[int, ...]) -> None:
@@ -146,6 +209,12 @@ class TestWorld:
         with pytest.raises(ValueError, match="patterns must have shape") as refusal:
             task_arrays(Task(**{field: 7}), Patterns.draw(Task(), 0))
         assert "(1, 50, 100)" in str(refusal.value)
+
+    def test_a_trial_must_fit_into_the_memory(self) -> None:
+        task = Task(n_inputs=10**8, pattern_bins=1, background_bins=10**7, rate=0.5)
+        patterns = Patterns([], [0, 0], (1, 1, 10**8))  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match=r"a trial of .* bins .* needs .* GiB"):
+            task_arrays(task, patterns)
 
     def test_patterns_must_be_patterns(self) -> None:
         with pytest.raises(ValueError, match=r"use Patterns\.from_dense"):
