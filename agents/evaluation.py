@@ -102,12 +102,16 @@ def answers(
         seed: of the stream; the order of a data set is its own.
     """
     source = source_of(task, patterns)
+    once = trials is None
     if trials is None:
         trials = source.n_trials or ANSWERED
     trials, seed = whole("trials", trials, low=1), whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     units = lane_groups(agents, source, threads=1)
-    parts = [group.answer(np.random.default_rng(seed), trials) for group, _ in units]
+    parts = []
+    for group, _ in units:
+        source.restart(in_order=once)
+        parts.append(group.answer(np.random.default_rng(seed), trials))
     places = np.concatenate([places for _, places in units])
 
     def in_order(arrays: list[NDArray[Any]]) -> NDArray[Any]:

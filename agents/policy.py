@@ -71,7 +71,9 @@ class PolicyBatch:
 
         Run k hears the stream of `gnm/PatternStream-v0` after `reset(seed=first_seed + k)`.
         """
-        from gnm_env.vector_env import PatternStreamVectorEnv  # only who scores policies needs it
+        from gnm_env.stream_task.vector import (
+            PatternStreamVectorEnv,
+        )  # only who scores policies needs it
 
         assert isinstance(self._source, TaskSource)
         streams = PatternStreamVectorEnv(runs, self._source.task, self._source.patterns)

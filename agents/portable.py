@@ -58,15 +58,9 @@ def _rebuilt(function: Any, tree: ast.Module, definition: ast.FunctionDef) -> An
     for argument in definition.args.args:
         argument.annotation = None
     if code.co_freevars:  # what the function takes from the function around it
-        maker = ast.FunctionDef(
-            name="_maker",
-            args=ast.arguments(
-                [], [ast.arg(name) for name in code.co_freevars], None, [], [], None, []
-            ),
-            body=[definition, ast.Return(ast.Name(definition.name, ast.Load()))],
-            decorator_list=[],
-            type_params=[],
-        )
+        source = f"def _maker({', '.join(code.co_freevars)}):\n    return {definition.name}"
+        maker: Any = ast.parse(source).body[0]
+        maker.body.insert(0, definition)
         tree.body = [maker]
     ast.fix_missing_locations(tree)
     ast.increment_lineno(tree, code.co_firstlineno - 1)

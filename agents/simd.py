@@ -23,6 +23,9 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
 Comparisons give masks, to be joined by ``&`` and ``|``. Also ``-x``, ``x**2``, ``abs``, ``min``,
 ``max`` and ``exp``, ``log``, ``sqrt`` of math and NumPy work; `exp` and `log` call the C library
 once per lane.
+
+Rows are read and written by their addresses. With GNM_CHECKED=1 in the environment (see
+`gnm_env.compiled`) a row or a lane outside the array raises IndexError.
 """
 
 from __future__ import annotations
@@ -39,10 +42,13 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
+from gnm_env.compiled import CHECKED
+
 _intrinsic: Any = intrinsic  # called from compiled code, without the typing context
 _DOUBLE = ir.DoubleType()
 _BIT = ir.IntType(1)
 _INT32 = ir.IntType(32)
+_INTP = types.intp
 
 
 class Lanes(types.Type):
@@ -202,22 +208,29 @@ def negated(typing_context: Any, mask: Any) -> Any:
     return mask(mask), lambda context, builder, sig, args: builder.not_(args[0])
 
 
-def _row_address(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
+def _row_address(
+    context: Any, builder: Any, array_type: Any, array: Any, row: Any, width: int
+) -> Any:
     structure = context.make_array(array_type)(context, builder, array)
+    if CHECKED:
+        sizes = [*cgutils.unpack_tuple(builder, structure.shape), context.get_constant(_INTP, 1)]
+        cgutils.do_boundscheck(context, builder, row, sizes[0])
+        cgutils.do_boundscheck(context, builder, context.get_constant(_INTP, width - 1), sizes[1])
     stride = cgutils.unpack_tuple(builder, structure.strides)[0]
     base = builder.ptrtoint(structure.data, ir.IntType(64))
     return builder.add(base, builder.mul(stride, row))
 
 
 def _load_row(context: Any, builder: Any, array_type: Any, array: Any, row: Any, width: int) -> Any:
-    address = _row_address(context, builder, array_type, array, row)
+    address = _row_address(context, builder, array_type, array, row, width)
     value = builder.load(builder.inttoptr(address, _vector(width).as_pointer()))
     value.align = 8  # rows are aligned as their numbers are, not as whole vectors
     return value
 
 
 def _store_row(context: Any, builder: Any, array: Any, value: Any, row: Any, x: Any) -> None:
-    address = _row_address(context, builder, array, value, row)
+    width = x.type.count if isinstance(x.type, ir.VectorType) else 1
+    address = _row_address(context, builder, array, value, row, width)
     builder.store(x, builder.inttoptr(address, x.type.as_pointer())).align = 8
 
 

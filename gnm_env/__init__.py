@@ -6,10 +6,10 @@ Importing this package registers `gnm/PatternTrial-v0` and `gnm/PatternStream-v0
 from gymnasium.envs.registration import register
 
 from gnm_env.rules import MAX_EPISODE_BINS
-from gnm_env.stream_env import PatternStreamEnv
+from gnm_env.stream_task.env import PatternStreamEnv
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
-from gnm_env.trial_env import PatternTrialEnv
+from gnm_env.trial_task.env import PatternTrialEnv
 from gnm_env.trials import Trials
 
 __all__ = [
@@ -24,12 +24,12 @@ __all__ = [
 
 register(
     "gnm/PatternTrial-v0",
-    entry_point="gnm_env.trial_env:PatternTrialEnv",
-    vector_entry_point="gnm_env.vector_env:PatternTrialVectorEnv",
+    entry_point="gnm_env.trial_task.env:PatternTrialEnv",
+    vector_entry_point="gnm_env.trial_task.vector:PatternTrialVectorEnv",
 )
 register(
     "gnm/PatternStream-v0",
-    entry_point="gnm_env.stream_env:PatternStreamEnv",
-    vector_entry_point="gnm_env.vector_env:PatternStreamVectorEnv",
+    entry_point="gnm_env.stream_task.env:PatternStreamEnv",
+    vector_entry_point="gnm_env.stream_task.vector:PatternStreamVectorEnv",
     max_episode_steps=MAX_EPISODE_BINS,
 )

@@ -63,13 +63,14 @@ _OUT_OF_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 @contextlib.contextmanager
-def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
+def atomic_write(path: str | os.PathLike[str], *, durable: bool = True) -> Iterator[IO[bytes]]:
     """A binary file that takes the place of `path` once complete; a failure leaves the old one.
 
     Whatever ends the writing early (an exception, SIGKILL, a power cut), `path` is afterwards
     either the old file or the new one, whole. Once the block has been left without an exception the
     new file lies on the disk: it and its folder have been flushed with fsync, so that a power cut
-    takes nothing unless the disk itself breaks its word.
+    takes nothing unless the disk itself breaks its word. (With durable=False it is not flushed, and
+    a power cut within the next minute may leave a file of the right name and wrong contents.)
 
     A symbolic link stays one, and the file that it points to is replaced. The permissions of an
     existing file are kept; a new file gets those of any new file. Several savers of one path may
@@ -94,7 +95,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                 os.fchmod(file.fileno(), mode)  # before a byte of it can be read by others
             yield file
             file.flush()
-            os.fsync(file.fileno())
+            if durable:
+                os.fsync(file.fileno())
             if fcntl is None:
                 file.close()  # Windows renames no file that is open
             os.replace(part, target)
@@ -108,7 +110,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                     "(a file that was there before is still there, as it was)"
                 ) from None
             raise
-    _sync_folder(target.parent)
+    if durable:
+        _sync_folder(target.parent)
 
 
 def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -55,11 +55,23 @@ def reward_for(error: float, tolerance: float, sign_only: bool) -> float:
     return -abs(error)
 
 
+def dense_reward(
+    output: float, given: float, owed: float, in_noise: bool, last_bin: bool, tolerance: float
+) -> float:
+    """Dense feedback for `output` in a bin of a segment that has had `given` so far, this included.
+
+    −1 at once per output in noise; as a presentation ends, the reward for its error; else 0.
+    """
+    if in_noise:
+        return 0.0 - output
+    return reward_for(owed - given, tolerance, False) if last_bin else 0.0
+
+
 compiled_rising = inlined(rising)
 compiled_too_many = inlined(too_many)
 compiled_too_few = inlined(too_few)
 compiled_reward_for = inlined(reward_for)
-
+compiled_dense_reward = specialise(dense_reward, "compiled", reward_for=compiled_reward_for)
 
 compiled_mistake = specialise(
     mistake, "compiled", too_many=compiled_too_many, too_few=compiled_too_few

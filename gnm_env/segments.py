@@ -12,12 +12,12 @@ whole trial, and it is owed the label. So the label is the sum of `target` in ev
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gnm_env.compiled import compiled
+from gnm_env.compiled import compiled, inlined
 
 
 class TrialArrays(NamedTuple):
@@ -65,3 +65,13 @@ def owner_of(edges: NDArray[np.int64]) -> NDArray[np.int64]:
         for t in range(edges[2 * k + 1], edges[2 * k + 2]):
             owner[t] = k
     return owner
+
+
+def segment_at(edges: Any, segment: int, bin_: int) -> int:
+    """The segment that bin `bin_` lies in: `segment`, or one after it. Empty ones hold no bin."""
+    while edges[segment + 1] <= bin_:
+        segment += 1
+    return segment
+
+
+compiled_segment_at = inlined(segment_at)

@@ -62,4 +62,4 @@ class ContinuousAgent(Agent):
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
         """As `NeuronAgent.predict`; (N,) gives an action of shape (1,), (n, N) gives (n, 1)."""
         amounts, states = self._predicted(observation, state, episode_start)
-        return (amounts if np.ndim(observation) == 1 else amounts[:, None]), (states,)
+        return (amounts if np.asarray(observation).ndim == 1 else amounts[:, None]), (states,)

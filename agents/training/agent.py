@@ -277,8 +277,10 @@ class Agent:
             np.empty((bins, 1)),
             np.empty((bins * self._model.n_notes, 1)),
         )
-        for short, place in zip(self._heard or (), long, strict=False):
-            place[: len(short)] = short
+        if self._heard is not None:
+            pairs: Any = zip(self._heard, long, strict=True)
+            for short, place in pairs:
+                place[: len(short)] = short
         self._heard = long
 
     # --- without learning ------------------------------------------------------------------------
@@ -298,7 +300,7 @@ class Agent:
         """
         outputs, states = self._predicted(observation, state, episode_start)
         actions = outputs.astype(np.int64)
-        return (actions.reshape(()) if np.ndim(observation) == 1 else actions), (states,)
+        return (actions.reshape(()) if np.asarray(observation).ndim == 1 else actions), (states,)
 
     def _predicted(
         self, observation: Any, state: Any, episode_start: Any

@@ -75,7 +75,7 @@ class AgentBatch:
             self._blocks([agent.model.parameters() for agent in self._agents]),
             self._blocks([agent.weights for agent in self._agents]),
             model.static(first.n_inputs),
-            len(model.state_type._fields),  # type: ignore[attr-defined]
+            len(model.state_type._fields),
             model.n_memory,
             model.n_notes,
         )

@@ -12,10 +12,7 @@ from gnm_env.compiled import compiled, inlined
 from gnm_env.sampling import DRAFT, begin_trial, fill_trial, grown, longer_buffers
 from gnm_env.segments import TrialArrays
 from gnm_env.task import TaskArrays
-
-BATCH_BINS = 4_096
-"""Trials are drawn ahead until this many bins are there (one trial at least): the parameters of a
-block are then read once for some twenty trials, and what was drawn stays in the cache."""
+from gnm_env.trials_kernels import BATCH_BINS, TrialsArrays, lay_out
 
 
 class Batch(NamedTuple):
@@ -113,6 +110,41 @@ def _lay_segments(
         classes[place] = which[k]
         classes[place + 1] = -1
     edges[first + 2 * n + 1] = n_bins
+
+
+class DataAhead(NamedTuple):
+    """The next trials of a data set, in their order."""
+
+    data: TrialsArrays
+    which: NDArray[np.int64]
+
+
+@compiled
+def take_batch(
+    rng: Generator, source: DataAhead, done: int, most: int, batch: Batch
+) -> tuple[Batch, int, int]:
+    """As `draw_batch`, from a data set: the trials which[done], which[done + 1], …"""
+    data, which = source
+    channels, offsets, edges, target, classes, bin_of, edge_of, onsets, room = batch
+    channels, offsets, edges, target, laid, longest = lay_out(
+        data, which, done, channels, offsets, edges, target, bin_of, edge_of
+    )
+    if classes.size < edges.size:
+        classes = grown(classes, edges.size)
+    for k in range(laid):
+        i = which[done + k]
+        first, n_segments = edge_of[k], edge_of[k + 1] - edge_of[k] - 1
+        presentation = data.first_edge[i] // 2 - i
+        for segment in range(n_segments):
+            classes[first + segment] = -1
+            if segment % 2 == 1:
+                classes[first + segment] = data.classes[presentation]
+                presentation += 1
+    return (
+        Batch(channels, offsets, edges, target, classes, bin_of, edge_of, onsets, room),
+        laid,
+        longest,
+    )
 
 
 @inlined

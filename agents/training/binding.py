@@ -10,7 +10,7 @@ from agents.learning.rule import CORRECTIONS, Rule
 from agents.learning.teaching import replay_template
 from agents.model import Model
 from agents.training import change
-from agents.training.batches import draw_batch
+from agents.training.batches import draw_batch, take_batch
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
     predict_template,
@@ -30,7 +30,7 @@ from agents.training.trial import (
 )
 from gnm_env.compiled import specialise
 
-SOURCES: dict[str, Any] = {"task": draw_batch}
+SOURCES: dict[str, Any] = {"task": draw_batch, "data": take_batch}
 """What fills a batch with trials, by the kind of source."""
 
 

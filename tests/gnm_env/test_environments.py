@@ -233,8 +233,8 @@ class TestBadInput:
             ({"task": "task"}, "task must be a gnm_env.Task, got str"),
             ({"patterns": np.zeros((1, 50, 100))}, "use Patterns.from_dense"),
             ({"patterns": Patterns.draw(Task(n_classes=2), 0)}, "patterns must have shape"),
-            ({"pattern_seed": -1}, "pattern seed must be >= 0"),
-            ({"pattern_seed": 0.5}, "pattern seed must be a whole number"),
+            ({"pattern_seed": -1}, "pattern_seed must be >= 0"),
+            ({"pattern_seed": 0.5}, "pattern_seed must be a whole number"),
         ],
     )
     def test_arguments_that_make_no_environment(
@@ -248,7 +248,9 @@ class TestBadInput:
     def test_a_render_mode_that_does_not_exist(self, id: str) -> None:
         entry = gym.spec(id).entry_point
         assert isinstance(entry, str)
-        with pytest.raises(ValueError, match="render_mode must be None or 'rgb_array', got 'x'"):
+        with pytest.raises(
+            ValueError, match="render_mode must be None, 'human' or 'rgb_array', got 'x'"
+        ):
             gym.envs.registration.load_env_creator(entry)(render_mode="x")
 
     @each_id

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gnm_env import Patterns, Task, glyphs
 from gnm_env import rendering as r
-from gnm_env.rendering import Scroll, class_colour, tint
+from gnm_env.colours import FAINT, GREY, INK, MISTAKE, WHITE, class_colour, tint
+from gnm_env.rendering import Scroll
 
 each_id = pytest.mark.parametrize("id", ["gnm/PatternTrial-v0", "gnm/PatternStream-v0"])
 
@@ -22,7 +23,7 @@ COUNTS_TOP = SPIKES_TOP + r.SPIKE_HEIGHT
 
 def new_scroll(**fields: Any) -> Scroll:
     task = Task(**fields)
-    return Scroll(task, Patterns.draw(task, 0))
+    return Scroll(task.n_inputs, task, Patterns.draw(task, 0))
 
 
 def has(area: NDArray[np.uint8], colour: tuple[int, int, int]) -> bool:
@@ -39,12 +40,14 @@ def column(frame: NDArray[np.uint8], bins_ago: int, top: int, height: int) -> ND
 @pytest.mark.parametrize("n_classes", [1, 4, 40])
 def test_frames_keep_their_size(n_inputs: int, n_classes: int) -> None:
     task = Task(n_inputs=n_inputs, n_classes=n_classes, rate=0.05, mean_occurrences=0.1)
-    scroll = Scroll(task, Patterns.draw(task, 0))
+    scroll = Scroll(n_inputs, task, Patterns.draw(task, 0))
     shape = scroll.frame().shape
     rng = np.random.default_rng(0)
     for t in range(260):
         row = (rng.random(n_inputs) < 0.05).astype(np.int8)
-        scroll.push(row, -1 if t % 70 < 20 else t % n_classes, t % 3, float(t % 5) - 2)
+        if t % 70 == 20:
+            scroll.present(t % n_classes, t % 4, 50)
+        scroll.push(row, t % 3, float(t % 5) - 2)
         if t % 40 == 0:
             assert scroll.frame().shape == shape
     assert scroll.frame().dtype == np.uint8
@@ -58,9 +61,9 @@ def test_a_spike_is_drawn_where_its_channel_is(n_inputs: int, channel: int) -> N
     scroll = new_scroll(n_inputs=n_inputs)
     row = np.zeros(n_inputs, np.int8)
     row[channel] = 1
-    scroll.push(row, -1, 0)
+    scroll.push(row, 0)
     newest = column(scroll.frame(), 0, r.TOP, r.RASTER_HEIGHT)
-    inked = np.flatnonzero((newest == r.INK).all(axis=2).any(axis=1))
+    inked = np.flatnonzero((newest == INK).all(axis=2).any(axis=1))
     assert len(inked) >= 1
     centre = (channel + 0.5) / n_inputs * r.RASTER_HEIGHT
     assert inked.min() - 1 <= centre <= inked.max() + 1
@@ -68,61 +71,66 @@ def test_a_spike_is_drawn_where_its_channel_is(n_inputs: int, channel: int) -> N
 
 def test_an_occurrence_is_shaded_in_the_colour_of_its_class() -> None:
     scroll = new_scroll(n_classes=2, pattern_bins=4)
-    for class_ in (-1, 1, 1, 1, 1, -1):
-        scroll.push(np.zeros(100, np.int8), class_, 0)
+    for t in range(6):
+        if t == 1:
+            scroll.present(1, 2, 4)
+        scroll.push(np.zeros(100, np.int8), 0)
     frame = scroll.frame()
-    for ago, colour in enumerate([(255, 255, 255), *[tint(class_colour(1))] * 4, (255, 255, 255)]):
+    for ago, colour in enumerate([WHITE, *[tint(class_colour(1))] * 4, WHITE]):
         assert (column(frame, ago, r.TOP, r.RASTER_HEIGHT) == colour).all()
-    assert (column(frame, 6, r.TOP, r.RASTER_HEIGHT) == r.FAINT).all()  # before the beginning
+    assert (column(frame, 6, r.TOP, r.RASTER_HEIGHT) == FAINT).all()  # before the beginning
 
 
 def test_spikes_that_are_not_owed_are_marked() -> None:
-    scroll = new_scroll(pattern_bins=4)  # owes 1
-    for class_, spike in [(-1, 1), (0, 1), (0, 0), (0, 1), (0, 0), (0, 1)]:
-        scroll.push(np.zeros(100, np.int8), class_, spike)
+    scroll = new_scroll()
+    for t, spike in enumerate((1, 1, 0, 1, 0, 1)):
+        if t in (1, 5):
+            scroll.present(0, 1, 4)
+        scroll.push(np.zeros(100, np.int8), spike)
     colours = [
-        r.WRONG if has(bar, r.WRONG) else r.INK if has(bar, r.INK) else None
+        MISTAKE if has(bar, MISTAKE) else INK if has(bar, INK) else None
         for bar in (column(scroll.frame(), ago, SPIKES_TOP, r.SPIKE_HEIGHT) for ago in range(6))
     ]
     # the last bin belongs to a new occurrence of the same class, right after the first
-    assert colours == [r.INK, None, r.WRONG, None, r.INK, r.WRONG]
+    assert colours == [INK, None, MISTAKE, None, INK, MISTAKE]
 
 
 @pytest.mark.parametrize(
     ("spikes", "ended", "colour"),
-    [(1, True, r.INK), (0, True, r.WRONG), (2, False, r.WRONG), (0, False, r.GREY)],
+    [(1, True, INK), (0, True, MISTAKE), (2, False, MISTAKE), (0, False, GREY)],
 )
 def test_given_and_owed_are_written_below_each_occurrence(
     spikes: int, ended: bool, colour: tuple[int, int, int]
 ) -> None:
-    scroll = new_scroll(pattern_bins=10)
+    scroll = new_scroll()
+    scroll.present(0, 1, 10)
     for t in range(10 if ended else 5):
-        scroll.push(np.zeros(100, np.int8), 0, int(t < spikes))
+        scroll.push(np.zeros(100, np.int8), int(t < spikes))
     for _ in range(20):
         if ended:
-            scroll.push(np.zeros(100, np.int8), -1, 0)
+            scroll.push(np.zeros(100, np.int8), 0)
     counts = scroll.frame()[COUNTS_TOP : COUNTS_TOP + r.COUNT_HEIGHT, r.LEFT :]
     assert has(counts, colour)
-    assert not any(has(counts, other) for other in {r.INK, r.WRONG, r.GREY} - {colour})
+    assert not any(has(counts, other) for other in {INK, MISTAKE, GREY} - {colour})
 
 
 def test_the_potential_appears_when_it_is_known() -> None:
     scroll = new_scroll()
     top = COUNTS_TOP + r.COUNT_HEIGHT + r.GAP
     area = slice(top, top + r.POTENTIAL_HEIGHT), slice(r.LEFT, None)
-    scroll.push(np.zeros(100, np.int8), -1, 0)
+    scroll.push(np.zeros(100, np.int8), 0)
     assert (scroll.frame()[area] == 255).all()
     for value in (0.5, -3.0, 7.0, float("inf")):
-        scroll.push(np.zeros(100, np.int8), -1, 0, value)
+        scroll.push(np.zeros(100, np.int8), 0, value)
         plot = scroll.frame()[area]
-        assert has(plot, r.INK) and has(plot, r.WRONG)  # the line and the threshold
+        assert has(plot, INK) and has(plot, MISTAKE)  # the line and the threshold
 
 
 def test_clear_forgets_everything() -> None:
     scroll = new_scroll()
     empty = scroll.frame()
     for _ in range(30):
-        scroll.push(np.ones(100, np.int8), 0, 1, 0.5)
+        scroll.push(np.ones(100, np.int8), 1, 0.5)
     assert not np.array_equal(scroll.frame(), empty)
     scroll.clear()
     assert np.array_equal(scroll.frame(), empty)
@@ -130,7 +138,7 @@ def test_clear_forgets_everything() -> None:
 
 def test_colours_of_neighbouring_classes_differ_and_none_is_that_of_a_mistake() -> None:
     colours = [class_colour(class_) for class_ in range(6)]
-    assert len({*colours, r.WRONG, r.INK}) == 8
+    assert len({*colours, MISTAKE, INK}) == 8
     assert class_colour(6) == colours[0]
 
 
@@ -162,7 +170,7 @@ class TestEnvironments:
         for _ in range(5):
             following, *_ = env.step(0)
             newest = column(env.render(), 0, r.TOP, r.RASTER_HEIGHT)  # type: ignore[arg-type]
-            inked = (newest[:, 0] == r.INK).all(axis=1)[::2]  # two rows a channel
+            inked = (newest[:, 0] == INK).all(axis=1)[::2]  # two rows a channel
             assert np.array_equal(inked, obs.astype(bool))
             obs = following
 

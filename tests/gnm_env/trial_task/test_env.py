@@ -11,7 +11,7 @@ import pytest
 from gymnasium.vector import SyncVectorEnv
 
 from gnm_env import Patterns, Task, Trial, draw_trial
-from gnm_env.trial_env import FEEDBACK
+from gnm_env.trial_task.params import FEEDBACK
 
 ID = "gnm/PatternTrial-v0"
 Policy = Callable[[Trial, int], float]

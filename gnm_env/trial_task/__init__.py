@@ -1,0 +1,1 @@
+"""gnm/PatternTrial-v0: single environment, vector environment, and its compiled kernels."""

@@ -1,0 +1,129 @@
+"""The campaign: bad inputs, random tasks, kills and flipped bytes, at any size, with a table.
+
+    python tests/campaign/run.py --size full --jobs 2
+    python tests/campaign/run.py --only inputs --owner gnm_env/trial
+
+Exit code 1 if anything crashed, hung, lost something, or was refused by somebody else's traceback.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+
+from tests.campaign.inputs import Case, cases  # noqa: E402  after the path
+from tests.campaign.pool import run_cases  # noqa: E402
+
+PARTS = ("inputs", "configurations", "kills", "flips")
+OUTCOMES = ("refused", "fine", "nonsense", "foreign", "crash", "hang")
+EVERY = {"small": 25, "full": 1}
+"""Every how many-th bad input is tried."""
+CONFIGURATIONS = {"small": 12, "full": 500}
+KILLS = {"small": 6, "full": 100}
+FLIPS = {"small": (30, 20), "full": (300, 200)}
+
+
+def verdict(case: Case, outcome: str) -> str:
+    """The outcome, with what was accepted told apart: as good as refused, or nonsense."""
+    if outcome in ("accepted", "warned"):
+        return "fine" if case.fine or outcome == "warned" else "nonsense"
+    return outcome
+
+
+def bad_inputs(
+    every: int, jobs: int, timeout: float, owner: str = ""
+) -> list[tuple[Case, str, str]]:
+    """Case, verdict and what was said, for every `every`-th case of an owner."""
+    everything = cases()
+    chosen = [n for n, case in enumerate(everything) if case.owner.startswith(owner)][::every]
+    results = run_cases(chosen, jobs, timeout)
+    return [(everything[n], verdict(everything[n], o), said) for n, (o, said) in results.items()]
+
+
+def table(results: list[tuple[Case, str, str]]) -> str:
+    """One row for each owner, one column for each verdict."""
+    rows: dict[str, Counter[str]] = {}
+    for case, outcome, _ in results:
+        rows.setdefault(case.owner, Counter())[outcome] += 1
+    total = sum(rows.values(), Counter())
+    width = max(len(owner) for owner in rows)
+    lines = [f"{'owner':{width}}" + "".join(f"{name:>10}" for name in OUTCOMES)]
+    for owner, row in [*sorted(rows.items()), ("all", total)]:
+        lines.append(f"{owner:{width}}" + "".join(f"{row[name] or '·':>10}" for name in OUTCOMES))
+    return "\n".join(lines)
+
+
+def findings(results: list[tuple[Case, str, str]]) -> str:
+    """Everything that is not as it should be, by owner, as Markdown."""
+    lines = []
+    for owner in sorted({case.owner for case, _, _ in results}):
+        bad = [r for r in results if r[0].owner == owner and r[1] not in ("refused", "fine")]
+        if bad:
+            lines.append(f"\n## {owner} ({len(bad)})\n")
+        for case, outcome, said in sorted(bad, key=lambda r: OUTCOMES[::-1].index(r[1])):
+            code = " ⏎ ".join(case.name.splitlines())
+            lines.append(f"- **{outcome}** `{code}`" + (f": {said[:240]}" if said else ""))
+    return "\n".join(lines)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--size", choices=EVERY, default="small", help="default: %(default)s")
+    parser.add_argument("--only", choices=PARTS, action="append", help="default: all parts")
+    parser.add_argument("--owner", default="", help="bad inputs to these files alone, by prefix")
+    parser.add_argument("--jobs", type=int, default=1, help="worker processes (default 1)")
+    parser.add_argument(
+        "--timeout", type=float, default=120.0, help="seconds per input (default 120)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of all that is random (default 0)")
+    parser.add_argument("--findings", type=Path, help="write what is wrong there, as Markdown")
+    parser.add_argument("--json", action="store_true", help="end with one line of JSON")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Run the parts asked for, print their tables, and say whether all is well."""
+    from tests.campaign import configurations, flips, kills
+
+    options = _arguments()
+    summary: dict[str, Any] = {}
+    well = True
+    for part in options.only or PARTS:
+        start = time.monotonic()
+        if part == "inputs":
+            results = bad_inputs(EVERY[options.size], options.jobs, options.timeout, options.owner)
+            counts = Counter(outcome for _, outcome, _ in results)
+            print(table(results))
+            if options.findings:
+                head = f"# Bad inputs: {len(results)}, {dict(counts)}\n"
+                options.findings.write_text(head + findings(results) + "\n")
+            sound = not any(counts[name] for name in ("foreign", "crash", "hang"))
+            sound &= counts["nonsense"] <= 0.01 * len(results)
+        else:
+            if part == "configurations":
+                counts = configurations.campaign(CONFIGURATIONS[options.size], options.seed)
+            elif part == "kills":
+                counts = kills.campaign(KILLS[options.size], options.seed)
+            else:
+                counts = flips.campaign(*FLIPS[options.size], options.seed)
+            sound = counts["wrong"] == 0
+            print(f"{part}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
+        summary[part] = {**counts, "seconds": round(time.monotonic() - start)}
+        well &= sound
+    if options.json:
+        print(json.dumps(summary))
+    return 0 if well else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
