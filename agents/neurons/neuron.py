@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
-from agents import registry
 from agents.model import Arrays, Model, PSPKernel, Response
 from agents.portable import portable
 from agents.simd import like, load
@@ -75,7 +74,6 @@ class Neuron(Model):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        registry.register("neuron", cls, ("step", "advance", "compiled_step"))
         if "step" in vars(cls):
             cls._compiled = (cls.name, portable(cls.step))
 
@@ -105,5 +103,7 @@ _ADVANCES: dict[Any, Any] = {}
 def _advance(labelled: tuple[str, Any]) -> tuple[str, Any]:
     label, compiled_step = labelled
     if compiled_step not in _ADVANCES:
-        _ADVANCES[compiled_step] = specialise(advance_template, label, step=compiled_step)
+        _ADVANCES[compiled_step] = specialise(
+            advance_template, label, inline=True, step=compiled_step
+        )
     return label, _ADVANCES[compiled_step]
