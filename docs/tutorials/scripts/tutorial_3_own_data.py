@@ -10,8 +10,8 @@ is known.
 # %%
 # A recording
 # -----------
-# Thirty cells fire at 8 Hz. Now and then a stimulus comes, and twelve of them fire in a fixed
-# order, a few milliseconds apart and not quite on time. Of each trial of 400 ms it is only written
+# Thirty cells fire at 4 Hz. Now and then a stimulus comes, and twelve of them fire in a fixed
+# order, within ten milliseconds and not quite on time. Of each trial of 400 ms it is only written
 # down how many stimuli there were.
 
 import gymnasium as gym
@@ -25,12 +25,12 @@ from gnm_env import Trial, Trials
 CELLS, SECONDS = 30, 0.4
 rng = np.random.default_rng(7)
 order = rng.permutation(CELLS)[:12]
-delays = np.sort(rng.uniform(0.0, 0.04, 12))
+delays = np.sort(rng.uniform(0.0, 0.01, 12))
 
 
 def one_trial(stimuli):
     """Spike times in seconds, one array a cell."""
-    times = [rng.uniform(0, SECONDS, rng.poisson(8 * SECONDS)) for _ in range(CELLS)]
+    times = [rng.uniform(0, SECONDS, rng.poisson(4 * SECONDS)) for _ in range(CELLS)]
     for start in np.arange(stimuli) * 0.1 + rng.uniform(0.01, 0.05):
         for cell, delay in zip(order, delays, strict=True):
             times[cell] = np.append(times[cell], start + delay + rng.normal(0, 0.001))
@@ -68,7 +68,8 @@ plt.show()
 # A data set goes where task and patterns would. Its trials come again and again, each time in
 # another order. ALL hears no more than whether the count was too low or too high.
 
-agent = NeuronAgent(GNM(alpha=0.1), AggregateLabel(learning_rate=2e-4), n_inputs=CELLS, seed=0)
+rule = AggregateLabel(learning_rate=2e-4, fraction=0.4)
+agent = NeuronAgent(GNM(alpha=0.2), rule, n_inputs=CELLS, seed=0)
 history = train_many([agent], heard, trials=40_000, seed=1)
 
 _, axes = plt.subplots(figsize=(6, 3), layout="constrained")
