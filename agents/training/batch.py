@@ -137,8 +137,9 @@ class AgentBatch:
         table, false_positives, wrong, absolute, noise_bins = run(
             rng, ahead, trials, self._source.n_classes, self._models
         )
+        blocks, width, *rest = table.shape  # named, since without classes it is empty
         return Answers(
-            table.reshape(-1, *table.shape[2:])[: len(self._agents)],
+            table.reshape(blocks * width, *rest)[: len(self._agents)],
             self._per_agent(false_positives).astype(np.int64),
             noise_bins,
             self._per_agent(wrong).astype(np.int64),
