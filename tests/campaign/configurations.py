@@ -101,9 +101,8 @@ def compare_environments(rng: Any, task: Any, patterns: Any) -> None:
     mode = AutoresetMode(rng.choice([m.value for m in AutoresetMode]))
     n, seed = int(rng.integers(1, 6)), int(rng.integers(0, 1000))
     envs: Any = gym.make_vec(
-        name, num_envs=n, **keywords, **limits,
-        vector_kwargs={"autoreset_mode": mode, "copy": bool(rng.random() < 0.5)},
-    )  # fmt: skip
+        name, num_envs=n, autoreset_mode=mode, copy=bool(rng.random() < 0.5), **keywords, **limits
+    )
     singles = [gym.make(name, disable_env_checker=True, **keywords, **limits) for _ in range(n)]
     wrap, wrap_vector = _wrappers(rng, graded)
     envs, singles = wrap_vector(envs), [wrap(env) for env in singles]

@@ -486,10 +486,10 @@ def _environments() -> list[Case]:
         made += _of(
             owner, vec,
             [*(f"num_envs={v}" for v in (*WHOLE, "0", "2**62", "10**7")),
-             *(f"num_envs=2, vector_kwargs=dict(copy={v})" for v in BOOL),
-             *(f"num_envs=2, vector_kwargs=dict(autoreset_mode={v})" for v in (*TEXT, "None")),
-             *(f"num_envs=2, vector_kwargs=dict(max_episode_steps={v})" for v in ("'x'", "0", "-1", "2.5", "2**62", "nan", "True")),
-             "num_envs=2, vector_kwargs=dict(bogus=1)"],
+             *(f"num_envs=2, copy={v}" for v in BOOL),
+             *(f"num_envs=2, autoreset_mode={v}" for v in (*TEXT, "None")),
+             *(f"num_envs=2, max_episode_steps={v}" for v in ("'x'", "0", "-1", "2.5", "2**62", "nan", "True")),
+             "num_envs=2, bogus=1" ],
         )  # fmt: skip
         for single in (True, False):
             env = f"{kind.lower()}_env()" if single else f"vector('{kind}')"
