@@ -13,16 +13,16 @@ from agents.evaluation import (
     noisy_performance,
 )
 from agents.history import History
-from agents.lane_group import Answers
 from agents.learning.aggregate_label import AggregateLabel
 from agents.learning.error_trace import ErrorTrace
-from agents.loop import WeightOverflow, train
-from agents.many import train_many
 from agents.neuron_agent import NeuronAgent
 from agents.neurons.gnm import GNM
 from agents.neurons.lif import LIF
 from agents.neurons.mst import MST
 from agents.recording import Recording, record
+from agents.training.batch import Answers
+from agents.training.loop import WeightOverflow, train
+from agents.training.many import train_many
 
 __all__ = [
     "GNM",

@@ -1,34 +1,38 @@
 """Checkpoints: one file, no pickle, written whole or not at all.
 
-A checkpoint is a zip of plain arrays (NumPy's npz) with a JSON header beside them. Each kind of
-agent registers itself with `register_kind`, so that `load_checkpoint` opens any of them.
+A checkpoint is a zip of plain arrays (NumPy's npz) with a JSON header beside them. The header names
+the classes of agent, model and rule and the modules that they came from; loading imports nothing by
+itself, but says which module to import where a class is not known.
 """
 
 from __future__ import annotations
 
-import importlib
 import json
+import math
 import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.files import atomic_write as atomic_write
+from agents import registry
+from gnm_env.files import ArraySpec, atomic_write, open_arrays, write_arrays
 from gnm_env.task import Patterns, Task, task_arrays
 
-FORMAT = 1
-_HEADER = "header"
-_KINDS: dict[str, type] = {}
-_HOMES = {
-    "neuron": "agents.neuron_agent",
-    "continuous": "agents.continuous",
-    "network": "agents.network",
+__all__ = ["Checkpoint", "atomic_write", "load_agent", "load_checkpoint", "save_agent"]
+
+FORMAT = 2
+"""Format 1 had the parts of the header under other names, by kind of agent; it is still read."""
+WHAT = "checkpoint"
+MOST_HEADER_BYTES = 10_000_000
+_ARRAYS = {
+    "weights": ArraySpec("f8", (None,)),
+    "velocity": ArraySpec("f8", (None,)),
+    "momentum": ArraySpec("f8", (None,)),
+    "patterns": ArraySpec("u1", (None,)),
 }
-"""Where the kinds of this package register themselves: imported when such a file is loaded."""
 _BIT_GENERATORS = {
     cls.__name__: cls
     for cls in (
@@ -39,7 +43,6 @@ _BIT_GENERATORS = {
         np.random.SFC64,
     )
 }
-_Class = TypeVar("_Class", bound=type)
 _Agent = TypeVar("_Agent")
 
 
@@ -60,86 +63,177 @@ class Checkpoint:
     rng: Generator | None = None
 
 
-def register_kind(kind: str) -> Callable[[_Class], _Class]:
-    """Class decorator: checkpoints of this kind are loaded by the class's `from_checkpoint`."""
-
-    def register(cls: _Class) -> _Class:
-        _KINDS[kind] = cls
-        return cls
-
-    return register
-
-
-def write(
+def save_agent(
     path: str | os.PathLike[str],
-    kind: str,
-    header: dict[str, Any],
-    arrays: dict[str, NDArray[Any]],
+    agent: Any,
     *,
     task: Task | None = None,
     patterns: Patterns | None = None,
     rng: Generator | None = None,
 ) -> None:
-    """Write a checkpoint; `header` must be JSON, infinities and all. Atomic."""
-    full_header = {"format": FORMAT, "kind": kind, **header}
-    contents = dict(arrays)
+    """Save `agent` with what else is to be kept; ValueError for what could not be loaded again."""
+    model, rule = agent.model, agent.rule
+    header: dict[str, Any] = {
+        "format": FORMAT,
+        "agent": _of_class("agent", type(agent)),
+        "model": _of_class(_kind_of(model), type(model)) | {"parameters": _parameters(model)},
+        "rule": _of_class("rule", type(rule)) | {"parameters": _parameters(rule)},
+        "n_inputs": agent.n_inputs,
+        "weight_bounds": agent.weight_bounds,
+        "overflowed": bool(agent.overflowed),
+        "trials": agent.trials,
+    }
+    contents = {"weights": agent.weights, "velocity": agent.velocity}
+    for name, array in contents.items():
+        if not np.isfinite(array).all():
+            raise ValueError(
+                f"the {name} hold NaN or infinity, which no checkpoint can be loaded with: "
+                "load an earlier checkpoint or start anew"
+            )
     if task is not None:
-        full_header["task"] = asdict(task)
+        if not isinstance(task, Task):
+            raise ValueError(f"task must be a gnm_env.Task, got {type(task).__name__}")
+        header["task"] = asdict(task)
     if patterns is not None:
+        if task is not None:
+            task_arrays(task, patterns)  # they must fit each other
+        elif not isinstance(patterns, Patterns):
+            raise ValueError(f"patterns must be gnm_env.Patterns, got {type(patterns).__name__}")
         contents["patterns"] = np.packbits(patterns.dense())
-        full_header["patterns_shape"] = patterns.shape
+        header["patterns_shape"] = patterns.shape
     if rng is not None:
-        full_header["rng"] = rng.bit_generator.state
-    text = json.dumps(full_header, default=_plain).encode()
-    with atomic_write(path) as file:
-        np.savez(file, allow_pickle=False, **{_HEADER: np.frombuffer(text, np.uint8)}, **contents)
+        state = rng.bit_generator.state
+        if state["bit_generator"] not in _BIT_GENERATORS:
+            raise ValueError(
+                f"a checkpoint cannot keep a generator of kind {state['bit_generator']}; "
+                f"known kinds: {', '.join(_BIT_GENERATORS)}"
+            )
+        header["rng"] = state
+    text = json.dumps(header, default=_plain).encode()
+    write_arrays(path, {"header": np.frombuffer(text, np.uint8), **contents})
+
+
+def _of_class(kind: str, cls: type) -> dict[str, Any]:
+    """How a header names a class; ValueError if loading would find another under its name."""
+    name = getattr(cls, "name", "")
+    known = registry.known(kind, name)
+    if known is not cls:
+        raise ValueError(
+            f"the {kind} {registry.home(cls)} cannot be saved: {name!r} is by now the name of "
+            f"{registry.home(known) if known else 'no class'}; define it once, under a name of "
+            "its own"
+        )
+    return {"name": name, "class": registry.home(cls)}
+
+
+def _kind_of(model: Any) -> str:
+    return "network" if registry.known("network", model.name) is type(model) else "neuron"
+
+
+def _parameters(part: Any) -> dict[str, Any]:
+    """The fields of a dataclass; ValueError unless it can be made of them again."""
+    values = {f.name: getattr(part, f.name) for f in fields(part) if f.init}
+    try:
+        again = type(part)(**json.loads(json.dumps(values, default=_plain)))
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"{part!r} cannot be saved: its parameters do not survive JSON ({error}); "
+            "use numbers, texts and None"
+        ) from None
+    if again != part:
+        raise ValueError(f"{part!r} cannot be saved: it would be loaded as {again!r}")
+    return values
 
 
 def _plain(value: Any) -> Any:
     """NumPy's numbers and arrays, as JSON knows them."""
-    return value.tolist()
-
-
-def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, NDArray[Any]]]:
-    """Kind, header and arrays of a checkpoint; ValueError if it is none or is damaged."""
-    try:
-        # Opened here, since np.load forgets to close what turns out to be no zip.
-        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        header = json.loads(arrays.pop(_HEADER).tobytes())
-        if header["format"] != FORMAT:
-            raise ValueError(f"format {header['format']}")
-        return header["kind"], header, arrays
-    except FileNotFoundError:
-        raise ValueError(f"there is no checkpoint {path}; give the path of a saved agent") from None
-    except Exception as error:
-        raise ValueError(
-            f"{path} is not a readable checkpoint ({type(error).__name__}: {error}); "
-            "it is damaged or of another kind: train and save again"
-        ) from None
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} is not JSON")
 
 
 def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     """Load an agent of any kind with all that was saved beside it; ValueError if it is damaged."""
-    kind, header, arrays = read(path)
-    if kind not in _KINDS and kind in _HOMES:
-        importlib.import_module(_HOMES[kind])
-    if kind not in _KINDS:
-        known = ", ".join(sorted({*_KINDS, *_HOMES}))
-        raise ValueError(f"{path} holds an agent of kind {kind!r}; known kinds: {known}")
-    try:
-        task = Task(**header["task"]) if "task" in header else None
-        patterns = None
-        if "patterns_shape" in header:
-            shape = tuple(header["patterns_shape"])
-            bits = np.unpackbits(arrays.pop("patterns"), count=int(np.prod(shape)))
-            patterns = Patterns.from_dense(bits.reshape(shape))
+    with open_arrays(path, what=WHAT) as file:
+        spec = ArraySpec("u1", (None,))
+        header = json.loads(file.read("header", spec).tobytes())
+        if not isinstance(header, dict):
+            raise ValueError("its header is no JSON object")
+        unknown = sorted(set(file.names) - set(_ARRAYS) - {"header"})
+        if unknown:
+            raise ValueError(f"it holds an array {unknown[0]!r} that does not belong there")
+        arrays = {name: file.read(name, _ARRAYS[name]) for name in file.names if name != "header"}
+        header = _upgraded(header, arrays)
+        task = _task(header)
+        patterns = _patterns(header, arrays)
         if task is not None and patterns is not None:
             task_arrays(task, patterns)  # they must fit each other
-        agent = _KINDS[kind].from_checkpoint(header, arrays)  # type: ignore[attr-defined]
-        return Checkpoint(agent, task, patterns, _generator(header.get("rng")))
-    except (LookupError, TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{path} is not a valid {kind} checkpoint: {error}") from None
+        return Checkpoint(_agent(header, arrays), task, patterns, _generator(header.get("rng")))
+
+
+def _upgraded(header: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
+    """A header of format 1 as one of format 2; the array of the velocity gets its name."""
+    if header["format"] == FORMAT:
+        return header
+    if header["format"] != 1:
+        raise ValueError(
+            f"its format is {header['format']!r}, and this version reads 1 and {FORMAT}: "
+            "load it with the version that wrote it"
+        )
+    kind = header["kind"]
+    arrays["velocity"] = arrays.pop("momentum")
+    model = {"neuron": header.get("neuron"), "continuous": "continuous", "network": "network"}[kind]
+    parameters = header["network"] if kind == "network" else header["neuron_parameters"]
+    return {
+        **header,
+        "format": FORMAT,
+        "agent": {"name": kind},
+        "model": {"name": model, "parameters": parameters},
+        "rule": {"name": header.get("rule", "bp"), "parameters": header["rule_parameters"]},
+        "n_inputs": header.get("n_inputs", len(arrays["weights"])),
+        "weight_bounds": header.get("weight_bounds"),
+        "trials": 0,
+    }
+
+
+def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
+    cls: Any = _class("agent", header["agent"])
+    model_kind = "network" if registry.known("network", header["model"]["name"]) else "neuron"
+    model = _class(model_kind, header["model"])(**header["model"]["parameters"])
+    rule = _class("rule", header["rule"])(**header["rule"]["parameters"])
+    bounds = header["weight_bounds"]
+    weights, velocity = arrays["weights"], arrays["velocity"]
+    n_inputs, trials = header["n_inputs"], header["trials"]
+    expected = model.n_weights(n_inputs)
+    if len(weights) != expected or len(velocity) != expected:
+        raise ValueError(
+            f"weights and velocity must have length {expected}, "
+            f"got {len(weights)} and {len(velocity)}"
+        )
+    if type(header["overflowed"]) is not bool or type(trials) is not int or trials < 0:
+        raise ValueError("its header does not say how far the agent was trained")
+    agent = cls.rebuilt(model, rule, n_inputs, None if bounds is None else tuple(bounds))
+    agent.weights, agent.velocity = weights, velocity
+    agent._trials, agent.overflowed = trials, header["overflowed"]
+    return agent
+
+
+def _class(kind: str, named: dict[str, Any]) -> Any:
+    return registry.find_class(kind, named["name"], named.get("class"))
+
+
+def _task(header: dict[str, Any]) -> Task | None:
+    return Task(**header["task"]) if "task" in header else None
+
+
+def _patterns(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Patterns | None:
+    if "patterns_shape" not in header:
+        return None
+    shape = tuple(int(n) for n in header["patterns_shape"])
+    n_bits = math.prod(shape)
+    if min(shape, default=0) < 1 or len(arrays["patterns"]) != -(-n_bits // 8):
+        raise ValueError(f"its patterns do not fill the shape {shape}")
+    return Patterns.from_dense(np.unpackbits(arrays["patterns"], count=n_bits).reshape(shape))
 
 
 def load_agent(path: str | os.PathLike[str], cls: type[_Agent]) -> _Agent:

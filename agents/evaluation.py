@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.lane_group import Answers
-from agents.many import lane_groups, thread_count
 from agents.policy import as_agent
+from agents.training.batch import Answers
+from agents.training.many import lane_groups, thread_count
+from agents.training.source import source_of
 from gnm_env.checks import whole
 from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import Patterns, Task
+
+ANSWERED = 2_000
+"""Trials of a stream that `answers` hears unless told otherwise."""
 
 
 def noisy_performance(
@@ -53,13 +57,14 @@ def noisy_performance(
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     bins = np.empty((len(agents), runs), np.int64)
     threads = thread_count(threads)
+    source = source_of(task, patterns)
     if shared or not agents:
-        units = lane_groups(agents, task, patterns, threads)
+        units = lane_groups(agents, source, threads)
     else:
         units = [
             (group, [b])
             for b in range(len(agents))
-            for group, _ in lane_groups(agents[b : b + 1], task, patterns, 1)
+            for group, _ in lane_groups(agents[b : b + 1], source, 1)
         ]
 
     def fill(unit: int) -> None:
@@ -82,23 +87,42 @@ def _survived(group: Any, first_seed: int, runs: int, cap: int) -> NDArray[np.in
 
 
 def answers(
-    agent: Any | Sequence[Any], task: Task, patterns: Patterns, trials: int = 2_000, seed: int = 0
+    agent: Any | Sequence[Any],
+    task: Task | Any,
+    patterns: Patterns | None = None,
+    trials: int | None = None,
+    seed: int = 0,
 ) -> Answers:
-    """What an agent, or each agent of a list, answers to `trials` trials of the stream `seed`."""
+    """What an agent, or each agent of a list, answers to trials, learning off.
+
+    Args:
+        agent: as for `noisy_performance`.
+        task, patterns: what is heard; or a data set of trials, `gnm_env.Trials`, in place of both.
+        trials: number of trials; None: 2,000, or each trial of the data set once.
+        seed: of the stream; the order of a data set is its own.
+    """
+    source = source_of(task, patterns)
+    once = trials is None
+    if trials is None:
+        trials = source.n_trials or ANSWERED
     trials, seed = whole("trials", trials, low=1), whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
-    units = lane_groups(agents, task, patterns, threads=1)
-    parts = [group.answer(np.random.default_rng(seed), trials) for group, _ in units]
+    units = lane_groups(agents, source, threads=1)
+    parts = []
+    for group, _ in units:
+        source.restart(in_order=once)
+        parts.append(group.answer(np.random.default_rng(seed), trials))
     places = np.concatenate([places for _, places in units])
 
-    def in_order(arrays: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    def in_order(arrays: list[NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate(arrays)[np.argsort(places)]
 
     return Answers(
         in_order([part.table for part in parts]),
-        in_order([part.false_alarms for part in parts]),
+        in_order([part.false_positives for part in parts]),
         parts[0].noise_bins,
         in_order([part.wrong for part in parts]),
+        in_order([part.absolute for part in parts]),
         trials,
     )
 

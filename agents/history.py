@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.checkpoint import atomic_write
+from gnm_env.files import atomic_write
 
 BLOCK = 1_000
 """Trials per entry of a learning curve, unless told otherwise."""

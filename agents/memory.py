@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gnm_env.task import Task
+from agents.training.source import Source
 
 BYTES_PER_WEIGHT = 56
 """A weight and its last change, in the agent and side by side (32), the agent's room for the input
@@ -23,17 +23,17 @@ BYTES_AT_LEAST = 4 * 2**20
 """What is left when all of these are small."""
 
 
-def bytes_needed(n_weights: int, n_agents: int, task: Task, threads: int) -> float:
+def bytes_needed(n_weights: int, n_agents: int, source: Source, threads: int) -> float:
     """Most bytes that training takes, the agents included: O(N · agents + threads · trial · block).
 
     For trials that vary in length this goes by the mean length; they are seldom much longer.
     """
-    spikes_per_bin = task.rate * task.n_inputs
-    bins = task.background_bins + task.mean_pattern_bins
     return (
         BYTES_PER_WEIGHT * n_weights
         + BYTES_PER_AGENT * n_agents
-        + (BYTES_PER_BIN + BYTES_PER_SPIKE * spikes_per_bin) * bins * min(threads, n_agents)
+        + (BYTES_PER_BIN + BYTES_PER_SPIKE * source.events_per_bin)
+        * source.mean_bins
+        * min(threads, n_agents)
         + BYTES_AT_LEAST
     )
 
@@ -50,12 +50,12 @@ def bytes_there() -> float | None:
         return there
 
 
-def require_memory(n_weights: int, n_agents: int, task: Task, threads: int) -> None:
+def require_memory(n_weights: int, n_agents: int, source: Source, threads: int) -> None:
     """ValueError if agents with all that they need exceed the memory that is there."""
-    needed, there = bytes_needed(n_weights, n_agents, task, threads), bytes_there()
+    needed, there = bytes_needed(n_weights, n_agents, source, threads), bytes_there()
     if there is not None and needed > there:
         raise ValueError(
-            f"{n_agents:,} agents of {task.n_inputs:,} inputs side by side need "
+            f"{n_agents:,} agents of {source.n_inputs:,} inputs side by side need "
             f"{needed / 2**30:,.1f} GiB, this machine has {there / 2**30:,.1f}: "
             "take fewer agents at a time, shorter trials or fewer threads"
         )

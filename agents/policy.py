@@ -9,10 +9,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from agents.kernels import MOST_SPIKES
-from agents.lane_group import Answers
-from gnm_env.task import Patterns, Task
-from gnm_env.trial import Trial, draw_trial
+from agents.training.batch import Answers
+from agents.training.source import Source, TaskSource
+from agents.training.streams import MOST_SPIKES
+from gnm_env.trial import Trial
 
 TRIALS_AT_ONCE = 500
 """Trials that one `predict` answers side by side."""
@@ -53,18 +53,18 @@ class PolicyAgent:
         return id(self)
 
     @classmethod
-    def lanes(cls, agents: Sequence[PolicyAgent], task: Task, patterns: Patterns) -> PolicyLanes:
+    def batch(cls, agents: Sequence[PolicyAgent], source: Source) -> PolicyBatch:
         """The one agent."""
         (agent,) = agents
-        return PolicyLanes(agent, task, patterns)
+        return PolicyBatch(agent, source)
 
 
-class PolicyLanes:
+class PolicyBatch:
     """One policy that hears many streams, or many trials, side by side."""
 
-    def __init__(self, policy: Policy, task: Task, patterns: Patterns) -> None:
+    def __init__(self, policy: Policy, source: Source) -> None:
         self._policy = policy
-        self._task, self._patterns = task, patterns
+        self._source = source
 
     def survive_streams(self, first_seed: int, runs: int, cap: int) -> NDArray[np.int64]:
         """Bins survived before the first mistake, (1, runs), at most `cap` each.
@@ -75,7 +75,8 @@ class PolicyLanes:
             PatternStreamVectorEnv,
         )  # only who scores policies needs it
 
-        streams = PatternStreamVectorEnv(runs, self._task, self._patterns)
+        assert isinstance(self._source, TaskSource)
+        streams = PatternStreamVectorEnv(runs, self._source.task, self._source.patterns)
         bits, _ = streams.reset(seed=first_seed)
         survived, alive = np.zeros(runs, np.int64), np.ones(runs, np.bool_)
         state, begins = None, np.ones(runs, np.bool_)
@@ -91,25 +92,34 @@ class PolicyLanes:
         return survived[None]
 
     def answer(self, rng: Generator, trials: int) -> Answers:
-        """Responses to `trials` trials drawn from `rng`."""
-        table = np.zeros((1, self._task.n_classes, MOST_SPIKES + 1), np.int64)
-        false_alarms, wrong, noise_bins = 0, 0, 0
+        """Responses to `trials` trials of the source, the next from `rng`."""
+        table = np.zeros((1, self._source.n_classes, MOST_SPIKES + 1), np.int64)
+        false_positives, wrong, absolute, noise_bins = 0, 0, 0, 0
         for trial, spikes in self._answered(rng, trials):
             owner = trial.owner()
             given = np.bincount(owner[spikes] + 1, minlength=len(trial.onsets) + 1)
             np.add.at(table[0], (trial.classes, np.minimum(given[1:], MOST_SPIKES)), 1)
-            false_alarms += int(given[0])
+            false_positives += int(given[0])
             noise_bins += int(np.sum(owner < 0))
-            wrong += int(spikes.sum() != trial.label)
-        return Answers(table, np.array([false_alarms]), noise_bins, np.array([wrong]), trials)
+            error = abs(int(spikes.sum()) - trial.label)
+            wrong += error > 0
+            absolute += error
+        return Answers(
+            table,
+            np.array([false_positives]),
+            noise_bins,
+            np.array([wrong]),
+            np.array([float(absolute)]),
+            trials,
+        )
 
     def _answered(self, rng: Generator, trials: int) -> Iterator[tuple[Trial, NDArray[np.bool_]]]:
         """Trials with the output spikes in each of their bins, (T,)."""
         for done in range(0, trials, TRIALS_AT_ONCE):
-            count = min(TRIALS_AT_ONCE, trials - done)
-            drawn = [draw_trial(self._task, self._patterns, rng) for _ in range(count)]
+            drawn = self._source.trials(rng, min(TRIALS_AT_ONCE, trials - done))
             # Shorter trials are followed by silence, which nobody counts.
-            raster = np.zeros((max(t.n_bins for t in drawn), count, self._task.n_inputs), np.int8)
+            shape = (max(t.n_bins for t in drawn), len(drawn), self._source.n_inputs)
+            raster = np.zeros(shape, np.int8)
             for k, trial in enumerate(drawn):
                 raster[: trial.n_bins, k] = trial.dense()
             spikes = self._play(raster)

@@ -12,7 +12,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-_REGISTERED: dict[str, dict[str, type]] = {"neuron": {}, "rule": {}, "agent": {}}
+_REGISTERED: dict[str, dict[str, type]] = {
+    "neuron": {},
+    "network": {},
+    "rule": {},
+    "agent": {},
+}
 
 
 def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
@@ -21,7 +26,7 @@ def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
     A class without a name, whose bases have none either, is a base of others and is not entered.
 
     Args:
-        kind: "neuron", "rule" or "agent".
+        kind: "neuron", "network", "rule" or "agent".
         cls: the class; defining one of the same module and name again replaces the earlier one, as
             running the cell of a notebook again does.
         step: attributes that make the class differ from its parent.
@@ -51,6 +56,11 @@ def register(kind: str, cls: type, step: tuple[str, ...] = ()) -> None:
             "choose another"
         )
     _REGISTERED[kind][name] = cls
+
+
+def known(kind: str, name: str) -> Any:
+    """The class of that kind and name; None if there is none."""
+    return _complete(kind).get(name)
 
 
 def home(cls: type) -> str:

@@ -17,9 +17,12 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
     where(mask, x, y)        x where the mask holds, y elsewhere; both are evaluated
     any_lane(mask)           whether the mask holds anywhere
     negated(mask)            where it does not hold
+    whole_power(x, n)        x**n by repeated squaring, n a whole number
     power(x, y)              x**y; one call of the C library per lane
 
-Comparisons give masks, to be joined by ``&`` and ``|``.
+Comparisons give masks, to be joined by ``&`` and ``|``. Also ``-x``, ``x**2``, ``abs``, ``min``,
+``max`` and ``exp``, ``log``, ``sqrt`` of math and NumPy work; `exp` and `log` call the C library
+once per lane.
 
 Rows are read and written by their addresses. With GNM_CHECKED=1 in the environment (see
 `gnm_env.compiled`) a row or a lane outside the array raises IndexError.
@@ -27,14 +30,17 @@ Rows are read and written by their addresses. With GNM_CHECKED=1 in the environm
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
+from numba import njit
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
 from gnm_env.compiled import CHECKED
 
@@ -164,13 +170,23 @@ _logical(operator.or_, lambda builder, x, y: builder.or_(x, y))
 @_intrinsic
 def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
     """`x` in the lanes where `mask` holds, `y` in the others."""
-    width = _width(mask)
+    # One condition for all lanes chooses between whole values.
+    width = max(map(_width, (mask, x, y)))
+    if all(isinstance(value, (Mask, types.Boolean)) for value in (x, y)):
+        return (Mask(width) if width > 1 else types.boolean)(mask, x, y), _select_masks
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         values = zip(args[1:], sig.args[1:], strict=True)
         return builder.select(args[0], *(_spread(context, builder, v, t, width) for v, t in values))
 
     return _lanes(width)(mask, x, y), generate
+
+
+def _select_masks(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    width = _width(sig.return_type)
+    pair = zip(args[1:], sig.args[1:], strict=True)
+    masks = (v if isinstance(t, Mask) else _splat(builder, v, width) for v, t in pair)
+    return builder.select(args[0], *masks)
 
 
 @_intrinsic
@@ -308,14 +324,94 @@ def power(typing_context: Any, x: Any, y: Any) -> Any:
     """x**y, lane by lane: the C library's `pow`, whatever the number of lanes."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pow_ = builder.module.declare_intrinsic("llvm.pow", [_DOUBLE])
-        if not isinstance(x, Lanes):
-            return builder.call(pow_, args)
-        result = ir.Constant(ir.VectorType(_DOUBLE, x.width), ir.Undefined)
-        for k in range(x.width):
-            lane = ir.Constant(_INT32, k)
-            number = builder.call(pow_, [builder.extract_element(a, lane) for a in args])
-            result = builder.insert_element(result, number, lane)
-        return result
+        return _called(builder, "llvm.pow", args, _width(x))
 
     return x(x, y), generate
+
+
+def _called(builder: Any, name: str, args: Any, width: int) -> Any:
+    """What LLVM's function `name` gives for each lane: one call of the C library each."""
+    function = builder.module.declare_intrinsic(name, [_DOUBLE])
+    if width == 1:
+        return builder.call(function, args)
+    result = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
+    for k in range(width):
+        lane = ir.Constant(_INT32, k)
+        number = builder.call(function, [builder.extract_element(a, lane) for a in args])
+        result = builder.insert_element(result, number, lane)
+    return result
+
+
+def _of_each(name: str) -> Any:
+    @_intrinsic
+    def function(typing_context: Any, x: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return _called(builder, name, args, _width(x))
+
+        return x(x), generate
+
+    return function
+
+
+def _teach_function(function: Any, name: str) -> None:
+    """Teach numba `function` of lanes, LLVM's `name` of each."""
+    each = _of_each(name)
+
+    @overload(function, strict=False)
+    def of_lanes(x: Any) -> Any:
+        return (lambda x: each(x)) if isinstance(x, Lanes) else None
+
+
+for _name, _functions in (
+    ("llvm.exp", (math.exp, np.exp)),
+    ("llvm.log", (math.log, np.log)),
+    ("llvm.sqrt", (math.sqrt, np.sqrt)),
+):
+    for _function in _functions:
+        _teach_function(_function, _name)
+
+
+@overload(abs, strict=False)
+def _absolute(x: Any) -> Any:
+    return (lambda x: where(x < 0.0, -x, x + 0.0)) if isinstance(x, Lanes) else None
+
+
+@overload(min, strict=False)
+def _smaller(x: Any, y: Any) -> Any:
+    if not any(isinstance(value, Lanes) for value in (x, y)):
+        return None
+    return lambda x, y: where(y < x, y, x)
+
+
+@overload(max, strict=False)
+def _larger(x: Any, y: Any) -> Any:
+    if not any(isinstance(value, Lanes) for value in (x, y)):
+        return None
+    return lambda x, y: where(y > x, y, x)
+
+
+@overload(operator.neg, strict=False)
+def _negative(x: Any) -> Any:
+    return (lambda x: x * -1.0) if isinstance(x, Lanes) else None
+
+
+@overload(operator.pow, strict=False)
+def _to_the_power(x: Any, y: Any) -> Any:
+    if isinstance(x, Lanes) and isinstance(y, types.Integer):
+        return lambda x, y: whole_power(x, y)
+    if isinstance(x, Lanes):
+        return lambda x, y: power(x, where(x == x, y, y))
+    return None
+
+
+@njit
+def whole_power(x: Any, exponent: int) -> Any:
+    """x**exponent by repeated squaring, as plain numbers are raised to a constant."""
+    result = like(1.0, x)
+    rest = abs(exponent)
+    while rest > 0:
+        if rest & 1:
+            result = result * x
+        x = x * x
+        rest >>= 1
+    return 1.0 / result if exponent < 0 else result

@@ -95,7 +95,7 @@ def warn_of_unit(channels: Sequence[Any], n_spikes: int, bin_width: float) -> No
         )
 
 
-def warn_of_merged(merged: int) -> None:
+def warn_of_merged(merged: int, stacklevel: int = 3) -> None:
     """Say once how many spikes found their channel's bin taken."""
     if merged:
         warnings.warn(
@@ -103,5 +103,5 @@ def warn_of_merged(merged: int) -> None:
             "channel has spiked already: several count as one; take a smaller bin_width to keep "
             "them apart",
             UserWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )

@@ -34,6 +34,7 @@ from typing import Any
 import llvmlite
 import numba
 from numba import njit
+from numba import types as numba_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserWideCacheLocator
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
@@ -64,9 +65,24 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:
-    dispatcher: Any = njit(nogil=True, error_model="numpy", boundscheck=CHECKED, **options)(
-        function
-    )
+    """Numba's dispatcher, with our cache, and with less to compile than by default.
+
+    Numba compiles a function anew for each constant that it is called with, and an entry for C
+    beside the one for Python. Nothing here needs either, and both take seconds at the first start.
+    """
+    decorate: Any = njit  # whose annotations lack one of the options
+    dispatcher = decorate(
+        nogil=True, error_model="numpy", boundscheck=CHECKED, no_cfunc_wrapper=True, **options
+    )(function)
+    resolve = dispatcher.get_call_template
+
+    def by_type(args: Any, kws: Any) -> Any:
+        return resolve(
+            tuple(numba_types.unliteral(type_) for type_ in args),
+            {name: numba_types.unliteral(type_) for name, type_ in kws.items()},
+        )
+
+    dispatcher.get_call_template = by_type
     try:
         dispatcher._cache = _Cache(function)
     except RuntimeError as error:  # there is no place to keep it
@@ -80,11 +96,13 @@ def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any
     This is how one loop serves every neuron and every rule: the template calls `step`, and each
     neuron binds its own. `label` names the combination and tells the results in the cache apart.
     """
+    template = getattr(template, "py_func", template)
     function = types.FunctionType(
         template.__code__,
         {**template.__globals__, **bindings},
         f"{template.__name__}_{label}",
         template.__defaults__,
+        template.__closure__,
     )
     function.__qualname__ = function.__name__
     function.__doc__ = template.__doc__

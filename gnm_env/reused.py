@@ -29,6 +29,10 @@ class ReusedRows:
         self._renew()
         self._unlent = self._references()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy lends rows of its own."""
+        return ReusedRows, self._shape
+
     def _renew(self) -> None:
         self._block = np.empty(self._shape, object)
         self._rows = list(self._block)

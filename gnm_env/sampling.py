@@ -54,13 +54,15 @@ def _fill_noise(
 
     The bits are taken in one row, bin by bin. The gap to the next 1 is geometric,
     floor(exponential / −ln(1−p)), so that only the spikes cost a draw; `position` is the last 1
-    (−1 at the beginning), `n_events` the number of spikes so far.
+    (−1 at the beginning), `n_events` the number of spikes so far. Where channels have rates of
+    their own, ones are drawn at the largest of them, and each is kept with its channel's share.
     """
     if position < 0:
         for t in range(bin_, bin_ + n_bins):
             offsets[t + 1] = 0
     n_inputs = np.uint64(task.n_inputs)
     n_bits = n_bins * task.n_inputs
+    thinned = task.kept.size > 0
     done = False
     while n_events < channels.size and not done:
         gap = rng.standard_exponential() / task.hazard
@@ -70,9 +72,11 @@ def _fill_noise(
             position += 1 + int(gap)
             # Unsigned: a signed division that rounds down costs three times as much.
             noise_bin = np.int64(np.uint64(position) // n_inputs)
-            channels[np.uint64(n_events)] = position - noise_bin * task.n_inputs
-            offsets[np.uint64(bin_ + noise_bin + 1)] += 1
-            n_events += 1
+            channel = position - noise_bin * task.n_inputs
+            if not thinned or rng.random() < task.kept[np.uint64(channel)]:
+                channels[np.uint64(n_events)] = channel
+                offsets[np.uint64(bin_ + noise_bin + 1)] += 1
+                n_events += 1
     if done:
         _accumulate(offsets, bin_, n_bins)
     return position, n_events, done

@@ -59,6 +59,8 @@ class Task:
         jitter_bins: j; each spike of each occurrence is moved by an integer uniform on −j … j and
             held at the pattern's first or last bin where that would carry it outside.
         deletion: probability that a spike of an occurrence is dropped.
+        rates: in place of `rate` one probability for each channel, say those of a recording
+            (`Trials.rates`); `rate` is then their mean.
     """
 
     n_inputs: int = 100
@@ -71,6 +73,7 @@ class Task:
     onset_probability: float = 0.01
     jitter_bins: int = 0
     deletion: float = 0.0
+    rates: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, value: Any) -> None:
@@ -78,6 +81,9 @@ class Task:
 
         for name, high in _LIMITS.items():
             put(name, whole(name, getattr(self, name), low=1, high=high))
+        put("rates", self._checked_rates())
+        if self.rates is not None:
+            put("rate", math.fsum(self.rates) / self.n_inputs)
         for name in ("rate", "onset_probability", "deletion"):
             put(name, real(name, getattr(self, name), low=0.0, high=1.0))
         put("mean_occurrences", real("mean_occurrences", self.mean_occurrences, low=0.0))
@@ -107,6 +113,20 @@ class Task:
                 f"got {len(targets) if isinstance(targets, Sized) else 'another number'}"
             )
         return checked
+
+    def _checked_rates(self) -> tuple[float, ...] | None:
+        rates = self.rates
+        if rates is None:
+            return None
+        if isinstance(rates, str) or not isinstance(rates, Iterable):
+            raise ValueError(f"rates must be a sequence of probabilities, got {shown(rates)}")
+        given = list(itertools.islice(rates, self.n_inputs + 1))
+        if len(given) != self.n_inputs:
+            raise ValueError(
+                f"rates must have one entry per channel, n_inputs = {self.n_inputs}, "
+                f"got {len(rates) if isinstance(rates, Sized) else 'another number'}"
+            )
+        return tuple(real(f"rates[{i}]", p, low=0.0, high=1.0) for i, p in enumerate(given))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Through the constructor, so that what is unpickled is checked."""
@@ -196,7 +216,9 @@ class Patterns:
 
     @classmethod
     def draw(cls, task: Task, seed: int) -> Patterns:
-        """Draw patterns of `task` at random: each bit is 1 with probability `task.rate`.
+        """Draw patterns of `task` at random: each bit is 1 with the probability `task.rate`.
+
+        With `task.rates`, each channel has its own.
 
         The generator is default_rng((seed, 1)), so that equal seeds mean equal patterns everywhere
         and a stream with the same seed shares no bits with them.
@@ -210,7 +232,8 @@ class Patterns:
             9.0 * math.prod(shape),
             "lower n_classes, pattern_bins or n_inputs",
         )
-        return cls.from_dense(np.random.default_rng((seed, 1)).random(shape) < task.rate)
+        rates = task.rate if task.rates is None else np.array(task.rates)
+        return cls.from_dense(np.random.default_rng((seed, 1)).random(shape) < rates)
 
     @classmethod
     def from_dense(cls, array: ArrayLike) -> Patterns:
@@ -331,6 +354,9 @@ class TaskArrays(NamedTuple):
     targets: NDArray[np.int64]
     pattern_channels: NDArray[np.int32]
     pattern_offsets: NDArray[np.int64]
+    kept: NDArray[np.float64]
+    """Where channels have rates of their own, (N,): each over the largest, to which `hazard`
+    belongs; the share of its spikes that are kept. Else empty."""
 
 
 def task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
@@ -361,6 +387,8 @@ def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
         (8.0 * task.rate * task.n_inputs + 16.0) * bins,
         "lower background_bins, pattern_bins, mean_occurrences, n_inputs or rate",
     )
+    rates = np.array([] if task.rates is None else task.rates, np.float64)
+    most = task.rate if task.rates is None else max(task.rates)
     with np.errstate(divide="ignore"):
         return TaskArrays(
             task.n_inputs,
@@ -370,11 +398,12 @@ def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
             task.jitter_bins,
             task.deletion,
             task.mean_occurrences,
-            float(-np.log1p(-task.rate)),
+            float(-np.log1p(-most)),
             float(-np.log1p(-task.onset_probability)),
             np.array(task.owed, np.int64),
             # Copies, which can be written to as those that pickle makes can: compiled code is made
             # anew for read-only arrays.
             patterns.channels.copy(),
             patterns.offsets.copy(),
+            rates / most if most > 0.0 else rates,
         )

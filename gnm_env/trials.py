@@ -154,7 +154,7 @@ class Trials:
             16.0 * spikes + 200.0 * n,
             "draw fewer",
         )
-        held = Generators([_generator(seed)]).held
+        held = Generators([seeded(seed)]).held
         arrays = TrialsArrays(task.n_inputs, *draw(held, numbers, n, int(1.02 * spikes) + 64))
         return cls._of(arrays, task.n_classes, task.pattern_bins)
 
@@ -435,7 +435,7 @@ class Trials:
         Raises ValueError if a part would be empty.
         """
         fraction = real("fraction", fraction, low=0.0, high=1.0)
-        rng = _generator(seed)
+        rng = seeded(seed)
         groups = np.arange(len(self)) if by is None else self._groups(by)
         order = rng.permutation(int(groups.max()) + 1)
         sizes = np.append(0, np.cumsum(np.bincount(groups)[order]))
@@ -460,7 +460,7 @@ class Trials:
 
     def shuffled(self, seed: int | Generator) -> Trials:
         """The same trials in random order."""
-        return self._selected(_generator(seed).permutation(len(self)))
+        return self._selected(seeded(seed).permutation(len(self)))
 
     def delayed(self, delays: Iterable[int]) -> Trials:
         """Trials with a copy of every channel for each delay, so many bins later.
@@ -593,7 +593,8 @@ def _length_of_all(a: TrialsArrays) -> int | None:
     return int(lengths[0]) if len(lengths) and np.all(lengths == lengths[0]) else None
 
 
-def _generator(seed: Any) -> Generator:
+def seeded(seed: Any) -> Generator:
+    """The generator of a seed, or the Generator that is given in its place."""
     if isinstance(seed, Generator):
         return seed
     return np.random.default_rng(whole("seed", seed, low=0, high=MAX_SEED))

@@ -17,7 +17,7 @@ from agents.neurons.gnm import Parameters as Rates
 from gnm_env.compiled import compiled, specialise
 
 CLOSED_FORM, SMOOTH_WHOLE, SMOOTH, STEP = range(4)
-"""mode[0]: η = 0; η > 0 with an exponent of the Hill function that is whole, real, infinite."""
+"""static[0]: η = 0; η > 0 with an exponent of the Hill function that is whole, real, infinite."""
 
 STEPS_PER_BIN = 8
 """Runge–Kutta steps per bin. What they are good for is measured in the documentation."""
@@ -56,25 +56,27 @@ def slopes(rates: Rates, H: float, V: float, R: float) -> tuple[float, float]:
 
 
 @compiled
-def _activation(rates: Rates, mode: tuple[int, ...], above: bool, V: float) -> float:
+def _activation(rates: Rates, static: tuple[int, ...], above: bool, V: float) -> float:
     """H(V); for an infinite exponent the caller says on which side of the step V is."""
-    if mode[0] == STEP:
+    if static[0] == STEP:
         return 1.0 if above else 0.0
-    return _hill_whole(rates, mode, V) if mode[0] == SMOOTH_WHOLE else _hill_real(rates, mode, V)
+    return (
+        _hill_whole(rates, static, V) if static[0] == SMOOTH_WHOLE else _hill_real(rates, static, V)
+    )
 
 
 @compiled
 def _runge_kutta(
-    rates: Rates, mode: tuple[int, ...], above: bool, V: float, R: float, dt: float
+    rates: Rates, static: tuple[int, ...], above: bool, V: float, R: float, dt: float
 ) -> tuple[float, float]:
     """V and R after one step of the classical method of order 4."""
-    v1, r1 = slopes(rates, _activation(rates, mode, above, V), V, R)
+    v1, r1 = slopes(rates, _activation(rates, static, above, V), V, R)
     v, r = V + 0.5 * dt * v1, R + 0.5 * dt * r1
-    v2, r2 = slopes(rates, _activation(rates, mode, above, v), v, r)
+    v2, r2 = slopes(rates, _activation(rates, static, above, v), v, r)
     v, r = V + 0.5 * dt * v2, R + 0.5 * dt * r2
-    v3, r3 = slopes(rates, _activation(rates, mode, above, v), v, r)
+    v3, r3 = slopes(rates, _activation(rates, static, above, v), v, r)
     v, r = V + dt * v3, R + dt * r3
-    v4, r4 = slopes(rates, _activation(rates, mode, above, v), v, r)
+    v4, r4 = slopes(rates, _activation(rates, static, above, v), v, r)
     return V + dt / 6.0 * (v1 + 2.0 * (v2 + v3) + v4), R + dt / 6.0 * (r1 + 2.0 * (r2 + r3) + r4)
 
 
@@ -108,18 +110,18 @@ def _crossing(V: float, V_end: float, d: float, d_end: float, level: float) -> f
 
 @compiled
 def _step(
-    rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float
+    rates: Rates, static: tuple[int, ...], V: float, R: float, dt: float
 ) -> tuple[float, float, float, float]:
     """One step of length dt, or up to the step of H if V falls through it: V, R, S, time left."""
     above = rates.theta_b < V
-    V_end, R_end = _runge_kutta(rates, mode, above, V, R, dt)
+    V_end, R_end = _runge_kutta(rates, static, above, V, R, dt)
     d, _ = slopes(rates, 0.0, V, R)
     d_end, _ = slopes(rates, 0.0, V_end, R_end)
     left = 0.0
-    if mode[0] == STEP and above and V_end < rates.theta_b:
+    if static[0] == STEP and above and V_end < rates.theta_b:
         part = _crossing(V, V_end, d * dt, d_end * dt, rates.theta_b) * dt
         left, dt = dt - part, part
-        _, R_end = _runge_kutta(rates, mode, above, V, R, dt)
+        _, R_end = _runge_kutta(rates, static, above, V, R, dt)
         V_end = rates.theta_b
         d_end, _ = slopes(rates, 0.0, V_end, R_end)
     S = 0.0
@@ -132,32 +134,32 @@ def _step(
 
 
 @compiled
-def _pieces(rates: Rates, mode: tuple[int, ...], V: float, R: float, dt: float) -> int:
+def _pieces(rates: Rates, static: tuple[int, ...], V: float, R: float, dt: float) -> int:
     """Into how many a step is to be divided: many where V passes the steep part of H, else 1."""
     fall, _ = slopes(rates, 0.0, V, R)
     steep = (
         rates.flat_below * rates.theta_b < V and V + fall * dt < rates.flat_above * rates.theta_b
     )
-    return 1 + int(_PIECES * rates.h * -fall / V * dt) if mode[0] != STEP and steep else 1
+    return 1 + int(_PIECES * rates.h * -fall / V * dt) if static[0] != STEP and steep else 1
 
 
 @compiled
 def flow(
-    rates: Rates, mode: tuple[int, ...], V: float, R: float, duration: float, steps_per_bin: int
+    rates: Rates, static: tuple[int, ...], V: float, R: float, duration: float, steps_per_bin: int
 ) -> Between:
     """V and R after `duration` bins without input, and the S of that time."""
-    if mode[0] == CLOSED_FORM:
+    if static[0] == CLOSED_FORM:
         V_end = V * math.exp(-rates.leak * duration)
         return Between(V_end, 0.0, amount(rates, V, V_end))
     n_steps = math.ceil(duration * steps_per_bin)
     dt = duration / max(n_steps, 1)
     S = 0.0
     for _ in range(n_steps):
-        n_pieces = _pieces(rates, mode, V, R, dt)
+        n_pieces = _pieces(rates, static, V, R, dt)
         for _ in range(n_pieces):
-            V, R, gained, left = _step(rates, mode, V, R, dt / n_pieces)
+            V, R, gained, left = _step(rates, static, V, R, dt / n_pieces)
             S += gained
             if left > 0.0:
-                V, R, gained, left = _step(rates, mode, V, R, left)
+                V, R, gained, left = _step(rates, static, V, R, left)
                 S += gained
     return Between(V, R, S)

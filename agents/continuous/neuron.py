@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from agents.continuous.flow import CLOSED_FORM, SMOOTH, SMOOTH_WHOLE, STEP, Rates
-from agents.continuous.kernels import STEPS, Parameters, State
+from agents.continuous.steps import STEPS, Parameters, State
 from agents.neurons.gnm import GNM, LARGEST_WHOLE
-from agents.neurons.neuron import Neuron, Trace
+from agents.neurons.neuron import Neuron, PSPKernel
 from gnm_env.checks import real
 
 
@@ -76,9 +76,14 @@ class ContinuousGNM(Neuron):
         )
 
     def parameters(self) -> tuple[float, ...]:
-        return (*self.rates(), self.max_output, self.trace().slow)
+        return (*self.rates(), self.max_output, self.psp_kernel().slow)
 
-    def mode(self) -> tuple[int, ...]:
+    @property
+    def widest(self) -> int:  # type: ignore[override]
+        """Neurons of η > 0 take steps of their own, and so go one by one."""
+        return Neuron.widest if self.eta == 0.0 else 1
+
+    def static(self, n_inputs: int = 0) -> tuple[int, ...]:
         """How V and R go on between input spikes, and the exponent of H where it is whole."""
         if self.eta == 0.0:
             return (CLOSED_FORM, 0)
@@ -87,9 +92,9 @@ class ContinuousGNM(Neuron):
         whole = self.h <= LARGEST_WHOLE and self.h == int(self.h)
         return (SMOOTH_WHOLE, int(self.h)) if whole else (SMOOTH, 0)
 
-    def step(self) -> tuple[str, Any]:
+    def compiled_step(self) -> tuple[str, Any]:
         return STEPS[self.eta == 0.0]
 
-    def trace(self) -> Trace:
+    def psp_kernel(self) -> PSPKernel:
         """The response to one unit spike, right after the input of each bin: e^−(1−η)α a bin."""
-        return Trace(math.exp(-self.leak))
+        return PSPKernel(math.exp(-self.leak))

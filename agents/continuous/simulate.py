@@ -111,7 +111,7 @@ def simulate(
     w, times = checked_weights(weights, spikes.n_inputs), report_times(spikes, at)
     steps = whole("steps_per_bin", steps_per_bin, low=1)
     course = np.empty((3, times.size))
-    _walk(neuron.rates(), neuron.mode(), w, spikes.times, spikes.channels, times, steps, course)
+    _walk(neuron.rates(), neuron.static(), w, spikes.times, spikes.channels, times, steps, course)
     return Trajectory(times, *course)
 
 
@@ -141,7 +141,7 @@ def report_times(spikes: InputSpikes, at: ArrayLike | None) -> NDArray[np.float6
 @compiled
 def _walk(
     rates: Rates,
-    mode: tuple[int, ...],
+    static: tuple[int, ...],
     weights: NDArray[np.float64],
     times: NDArray[np.float64],
     channels: NDArray[np.int64],
@@ -156,12 +156,12 @@ def _walk(
     spike = 0
     for k in range(at.size):
         while spike < times.size and times[spike] <= at[k]:
-            state = flow(rates, mode, state.V, state.R, times[spike] - now, steps_per_bin)
+            state = flow(rates, static, state.V, state.R, times[spike] - now, steps_per_bin)
             S += state.S
             now = times[spike]
             state = Between(state.V + weights[channels[spike]], state.R, 0.0)
             spike += 1
-        state = flow(rates, mode, state.V, state.R, at[k] - now, steps_per_bin)
+        state = flow(rates, static, state.V, state.R, at[k] - now, steps_per_bin)
         S += state.S
         now = at[k]
         course[0, k] = state.V

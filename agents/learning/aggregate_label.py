@@ -8,26 +8,20 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.learning.rule import Outcome, Rule, RuleParameters
-from agents.simd import like, load, store, where
+from agents.learning.rule import Rule, RuleParameters, decay_option
+from agents.simd import any_lane, like, load, store, where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled
 
-_INSERTED = 48
-"""Up to this many of the largest eligibilities are found by insertion, more by selection."""
+_INSERTED = 20
+"""Up to this many of the largest eligibilities are found by insertion, more by cuts."""
+
+_FEW, _CUTS = 16.0, 8
+"""Cuts count all values until at most so many are left in each lane, or so often."""
 
 
 @compiled
-def correction(outcome: Outcome) -> Any:
-    """+1 where more output was owed, −1 where less, 0 where the sum was right."""
-    zero = like(0.0, outcome.emitted)
-    return where(
-        outcome.emitted < outcome.label, 1.0, where(outcome.emitted > outcome.label, -1.0, zero)
-    )
-
-
-@compiled
-def teaching_signal(mode: tuple[int, ...], V: Any, E: Any) -> Any:
+def teaching_signal(static: tuple[int, ...], V: Any, E: Any) -> Any:
     """ε_i = Σ_t x_i(t) V(t)."""
     return V
 
@@ -35,27 +29,30 @@ def teaching_signal(mode: tuple[int, ...], V: Any, E: Any) -> Any:
 @compiled
 def weight_change(
     p: RuleParameters,
-    mode: tuple[int, ...],
+    static: tuple[int, ...],
     sign: Any,
     eligibility: NDArray[np.float64],
 ) -> None:
     """Δ_i = ±λ for every i with ε_i strictly above the (k+1)-th largest ε, else 0; in place."""
-    count = mode[0]
+    count = static[0]
     step = sign * p.learning_rate
     if count >= len(eligibility):
         for i in range(len(eligibility)):
             store(eligibility, i, step)
         return
-    bar = nth_largest(eligibility, count, step)
+    bar = nth_largest(eligibility, count, sign != 0.0, step)
     for i in range(len(eligibility)):
         store(eligibility, i, where(load(eligibility, i, step) > bar, step, like(0.0, step)))
 
 
 @compiled
-def nth_largest(values: NDArray[np.float64], n: int, lanes: Any) -> Any:
-    """The value with exactly n values before it in descending order, in the lanes of `lanes`."""
+def nth_largest(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> Any:
+    """A number as good as the (n+1)-th largest value: the same values lie strictly above both.
+
+    In the lanes that `learns` names; `lanes` says how many there are.
+    """
     if n > _INSERTED:
-        return _selected(values, n, lanes)
+        return _between(values, n, learns, lanes)
     # The n + 1 largest so far, descending; every value sinks to its place, four at a time so that
     # the list is read and written once for four values.
     largest = np.full((n + 1, values.shape[1]), -np.inf)
@@ -80,34 +77,85 @@ def nth_largest(values: NDArray[np.float64], n: int, lanes: Any) -> Any:
 
 
 @compiled
-def _selected(values: NDArray[np.float64], n: int, lanes: Any) -> Any:
-    """`nth_largest` in O(N) whatever n, a lane after the other: Hoare's selection."""
-    bar = np.empty((1, values.shape[1]))
-    rest = np.empty(len(values))
-    for lane in range(values.shape[1]):
-        for i in range(len(values)):
-            rest[i] = values[i, lane]
-        low, high = 0, len(values) - 1
-        while low < high:
-            pivot = rest[(low + high) // 2]
-            i, j = low, high
-            while i <= j:
-                while rest[i] > pivot:
-                    i += 1
-                while pivot > rest[j]:
-                    j -= 1
-                if i <= j:
-                    rest[i], rest[j] = rest[j], rest[i]
-                    i += 1
-                    j -= 1
-            if n <= j:
-                high = j
-            elif n >= i:
-                low = i
-            else:
-                break
-        bar[0, lane] = rest[n]
-    return load(bar, 0, lanes)
+def _between(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> Any:
+    """`nth_largest` in O(N) whatever n, in all lanes at once: cuts between the lowest and highest.
+
+    low <= the (n+1)-th largest <= high throughout. A cut with exactly n values above it is as good
+    as that value and ends the search. Once few values are left between low and high, their rows are
+    taken aside; from then on low and high are values themselves, so that ties end it as well.
+    """
+    zero = like(0.0, lanes)
+    low, high = _extremes(values, lanes)
+    above_low, above_high = like(float(len(values)), lanes), zero
+    cut = low  # at once the answer where most eligibilities are 0
+    cuts = 0
+    while cuts < _CUTS and any_lane(learns & (low < high) & (above_low - above_high > _FEW)):
+        above = _count_above(values, cut)
+        few = above <= n
+        low, high = where(few, low, cut), where(few, cut, high)
+        above_low, above_high = where(few, above_low, above), where(few, above, above_high)
+        low = where(above == n, high, low)
+        cuts += 1
+        cut = _next_cut(low, high, above_low, above_high, n, cuts)
+    if not any_lane(learns & (low < high)):
+        return high
+    rest = np.empty_like(values)
+    rows = 0
+    for i in range(len(values)):
+        x = load(values, i, lanes)
+        store(rest, rows, x)
+        rows += any_lane(learns & (low < high) & (low <= x) & (x <= high))
+    while any_lane(learns & (low < high)):
+        above, nearest_below, nearest_above = above_high, low, high
+        for i in range(rows):
+            x = load(rest, i, lanes)
+            over = x > cut
+            above = above + where(over & (x <= high), 1.0, zero)
+            x_above, x_below = where(over, x, high), where(over, low, x)
+            nearest_above = where(x_above < nearest_above, x_above, nearest_above)
+            nearest_below = where(x_below > nearest_below, x_below, nearest_below)
+        few = above <= n
+        low, high = where(few, low, nearest_above), where(few, nearest_below, high)
+        above_low, above_high = where(few, above_low, above), where(few, above, above_high)
+        low = where(above == n, high, low)
+        cuts += 1
+        cut = _next_cut(low, high, above_low, above_high, n, cuts)
+    return high
+
+
+@compiled
+def _extremes(values: NDArray[np.float64], lanes: Any) -> tuple[Any, Any]:
+    """The lowest and the highest of the values, in each lane."""
+    low, high = like(np.inf, lanes), like(-np.inf, lanes)
+    for i in range(len(values)):
+        x = load(values, i, lanes)
+        low, high = where(x < low, x, low), where(x > high, x, high)
+    return low, high
+
+
+@compiled
+def _count_above(values: NDArray[np.float64], cut: Any) -> Any:
+    """How many values lie above the cut, in each lane."""
+    zero = like(0.0, cut)
+    count = zero
+    whole = len(values) - len(values) % 4
+    for i in range(0, whole, 4):  # four at a time: a sum has to wait for the one before it
+        a = where(load(values, i, cut) > cut, 1.0, zero)
+        b = where(load(values, i + 1, cut) > cut, 1.0, zero)
+        c = where(load(values, i + 2, cut) > cut, 1.0, zero)
+        d = where(load(values, i + 3, cut) > cut, 1.0, zero)
+        count = count + ((a + b) + (c + d))
+    for i in range(whole, len(values)):
+        count = count + where(load(values, i, cut) > cut, 1.0, zero)
+    return count
+
+
+@compiled
+def _next_cut(low: Any, high: Any, above_low: Any, above_high: Any, n: int, cuts: int) -> Any:
+    """Where n values would lie above if they lay evenly; every other time the middle."""
+    share = like(0.5, low) if cuts % 2 == 0 else (n + 0.5 - above_high) / (above_low - above_high)
+    cut = high - share * (high - low)
+    return where((low <= cut) & (cut < high), cut, low)
 
 
 @dataclass(frozen=True)
@@ -123,16 +171,17 @@ class AggregateLabel(Rule):
             k = round(fraction · N); 0.1 is the paper's ninth decile.
         trace_decay: decay factor per bin of the presynaptic trace in place of the neuron's own
             response (None); 0 reads the paper's ∫ I_i V dt literally.
+        decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
     """
 
     learning_rate: float = 1e-4
     momentum: float = 0.2
     fraction: float = 0.1
     trace_decay: float | None = None
+    decay_trials: int | None = decay_option()
 
     name: ClassVar[str] = "all"
-    uses_error: ClassVar[bool] = False
-    correction: ClassVar[Any] = correction
+    feedback: ClassVar[str] = "sign"
     teaching_signal: ClassVar[Any] = teaching_signal
     weight_change: ClassVar[Any] = weight_change
 
@@ -140,7 +189,7 @@ class AggregateLabel(Rule):
         super().__post_init__()
         real("fraction", self.fraction, low=0.0, high=1.0)
 
-    def mode(self, n_inputs: int) -> tuple[int, ...]:
+    def static(self, n_inputs: int) -> tuple[int, ...]:
         count = round(self.fraction * n_inputs)
         if count == 0:
             raise ValueError(

@@ -25,23 +25,23 @@ def apply_change(
     learns: Any,
     change: NDArray[np.float64],
     weights: NDArray[np.float64],
-    previous: NDArray[np.float64],
+    velocity: NDArray[np.float64],
 ) -> Any:
     """Δ_i <- Δ_i + μ·Δ_i(previous step); w_i <- clip(w_i + Δ_i), in the lanes that `learns` names.
 
-    The three arrays have one row per input; `previous` holds the Δ of the previous learning step,
+    The three arrays have one row per input; `velocity` holds the Δ of the previous learning step,
     momentum included and unclipped. A weight that would overflow keeps its last finite value.
     Returns the lanes in which none would have.
     """
     zero = p.momentum * 0.0
     probe = zero
     for i in range(len(change)):
-        old, before = load(weights, i, zero), load(previous, i, zero)
+        old, before = load(weights, i, zero), load(velocity, i, zero)
         delta = load(change, i, zero) + p.momentum * before
         new = old + delta
         overflow = new * 0.0  # 0 for finite numbers, else NaN
         probe = probe + overflow
         taken = learns & (overflow == 0.0)
         store(weights, i, where(taken, clipped(p, new), old))
-        store(previous, i, where(taken, delta, before))
+        store(velocity, i, where(taken, delta, before))
     return probe == 0.0

@@ -1,40 +1,59 @@
 """What every learning rule offers, and what a trial tells it.
 
-A rule acts once, at the end of a trial. It is one file beside this one, with a frozen dataclass
-derived from `Rule` and three compiled functions, written for one neuron or for many side by side
-(see `agents.simd`):
+A rule acts once, at the end of a trial. For every neuron whose potential is linear in its inputs,
+learning is Δw_i = f(Σ_t x_i(t) y(t)) with the presynaptic trace x_i: a rule is a *teaching signal*
+y(t). It is one file beside this one, or a class of your own: a frozen dataclass derived from
+`Rule`, with a `name`, the `feedback` that it uses, and one of
 
-- `correction(outcome) -> c`: 0 in the lanes that the trial teaches nothing, else what
-  `weight_change` wants to know, such as the sign of the error;
-- `teaching_signal(mode, V, E) -> y(t)`: eligibilities are ε_i = Σ_t x_i(t) y(t), with the
-  presynaptic trace x_i, the membrane potential V(t) and the error trace E(t);
-- `weight_change(p, mode, c, eligibility)`: turns ε into Δw, in place.
+- `teaching_signal(static, V, E) -> y(t)`: where V(t) and the error trace E(t) of the same bin are
+  all that it needs. Written for plain numbers, computed for many neurons side by side; with
+  `weight_change(p, static, c, eligibility)`, if Δ_i is to be anything but λ·ε_i;
+- `teach(p, trial, y) -> None`: where it needs the whole trial. It is handed the trial of one
+  neuron (`agents.learning.teaching.HeardTrial`) and writes y, (T,), which is all 0 before;
+- `change(p, trial, eligibility) -> bool`: where no y(t) says it. It writes ε, (N,), itself, and
+  returns whether there is anything to learn.
 
-Momentum and bounds are the same for every rule and live in `momentum.py`.
+`p` holds the rule's own numbers by name. Rate, momentum and bounds are the same for every rule and
+live in `momentum.py`.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import field, fields
 from typing import Any, ClassVar, NamedTuple
 
-from agents.neurons.neuron import Neuron, Trace
-from gnm_env.checks import real
+from agents import registry
+from agents.model import Model, PSPKernel
+from agents.portable import portable
+from agents.simd import like, load, store, where
+from gnm_env.checks import real, whole
+from gnm_env.compiled import compiled
+
+FEEDBACK: Mapping[str, str] = {
+    "sign": "whether the sum of the output spikes was too small or too large",
+    "label": "how many output spikes were missing or too many in the whole trial",
+    "reward": "the reward of the whole trial, −|label − emitted|",
+    "presentations": "where the presentations were, and what each of them was owed",
+    "none": "nothing",
+}
+"""What a rule may know of a trial, by the name of its `feedback`."""
 
 
 class Outcome(NamedTuple):
     """What a whole trial came to."""
 
     emitted: Any
-    """Output spikes in the trial."""
+    """Output in the trial."""
     label: Any
-    """Output spikes owed: the aggregate label."""
-    blamed: Any
+    """Output owed: the aggregate label."""
+    has_error: Any
     """Whether the error trace E is anything but zero; of noise only where the rule uses E."""
 
 
 class RuleParameters(NamedTuple):
-    """The numbers of any rule, one per lane."""
+    """The numbers of any rule, one per lane; a rule's own numbers stand in the rows below."""
 
     learning_rate: Any
     momentum: Any
@@ -43,9 +62,69 @@ class RuleParameters(NamedTuple):
     highest: Any
     """… and upper weight bound; infinite where there is none."""
     slow: Any
-    """The presynaptic trace: see `agents.neurons.neuron.Trace`."""
+    """The presynaptic trace: see `agents.model.PSPKernel`."""
     fast: Any
     scale: Any
+    decay: Any
+    """Fraction of the learning rate that each trial takes away; 0 for a constant rate."""
+
+
+@compiled
+def sign_of_error(outcome: Outcome) -> Any:
+    """+1 where more output was owed, −1 where less, 0 where the sum was right."""
+    zero = like(0.0, outcome.emitted)
+    return where(
+        outcome.emitted < outcome.label, 1.0, where(outcome.emitted > outcome.label, -1.0, zero)
+    )
+
+
+@compiled
+def whole_error(outcome: Outcome) -> Any:
+    """Output missing in the trial, negative where there was too much."""
+    return outcome.label - outcome.emitted
+
+
+@compiled
+def any_error(outcome: Outcome) -> Any:
+    """1 where the error trace is anything but zero."""
+    return where(outcome.has_error, 1.0, like(0.0, outcome.emitted))
+
+
+@compiled
+def always(outcome: Outcome) -> Any:
+    """1: every trial teaches."""
+    return like(1.0, outcome.emitted)
+
+
+CORRECTIONS: Mapping[str, Any] = {
+    "sign": sign_of_error,
+    "label": whole_error,
+    "reward": always,
+    "presentations": any_error,
+    "none": always,
+}
+"""correction(outcome) -> c by feedback: 0 where a trial teaches nothing, else what it tells."""
+
+
+@compiled
+def in_proportion(p: RuleParameters, static: Any, c: Any, eligibility: Any) -> None:
+    """Δ_i = λ ε_i, in place."""
+    for i in range(len(eligibility)):
+        store(eligibility, i, p.learning_rate * load(eligibility, i, c))
+
+
+class _OwnNumbers:
+    """The default of `Rule.parameters_type`: a NamedTuple of a rule's own numeric fields."""
+
+    def __get__(self, instance: Any, owner: type) -> type:
+        numeric = ("float", "int", "bool", float, int, bool)
+        common = {"learning_rate", "momentum", "decay_trials"}
+        own = [f.name for f in fields(owner) if f.type in numeric and f.name not in common]
+        made = NamedTuple("Parameters", [(name, Any) for name in own or ["unused"]])  # type: ignore[misc]
+        # Where the compile cache finds it again.
+        made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.Parameters"
+        owner.Parameters = owner.parameters_type = made  # type: ignore[attr-defined]
+        return made
 
 
 class Rule(ABC):
@@ -53,25 +132,93 @@ class Rule(ABC):
 
     learning_rate: float
     momentum: float
-    trace_decay: float | None
+    trace_decay: float | None = None
+    decay_trials: int | None = None
 
     name: ClassVar[str]
-    uses_error: ClassVar[bool]
-    """Whether the error trace E(t) is needed; it needs the timing that the terminal info tells."""
-    correction: ClassVar[Any]
-    teaching_signal: ClassVar[Any]
-    weight_change: ClassVar[Any]
+    feedback: ClassVar[str]
+    """What the rule may know of a trial; a key of FEEDBACK."""
+    uses_error: ClassVar[bool] = False
+    """Whether its teaching signal takes the error trace E(t)."""
+    parameters_type: ClassVar[Any] = _OwnNumbers()
+    teaching_signal: ClassVar[Any] = None
+    weight_change: ClassVar[Any] = in_proportion
+    teach: ClassVar[Any] = None
+    change: ClassVar[Any] = None
+    block_change: ClassVar[Any] = None
+    """As `agents.training.change.pointwise_change_template`: for models that are no neurons."""
+    _pointwise: ClassVar[dict[str, Any]]
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        functions = ("teaching_signal", "teach", "change", "weight_change", "block_change")
+        registry.register("rule", cls, functions)
+        if getattr(cls, "name", None) is None:
+            return
+        feedback = getattr(cls, "feedback", None)
+        if feedback not in FEEDBACK:
+            raise ValueError(
+                f"{cls.__name__}.feedback must be one of {', '.join(FEEDBACK)}, got {feedback!r}"
+            )
+        if not any(getattr(cls, f) for f in ("teaching_signal", "teach", "change", "block_change")):
+            raise ValueError(
+                f"{cls.__name__} must say what it teaches: by teaching_signal(static, V, E), "
+                "teach(p, trial, y) or change(p, trial, eligibility); see agents.learning.rule"
+            )
+        if cls.teaching_signal is not None:
+            signal = portable(cls.teaching_signal)
+            cls._pointwise = {"teaching_signal": signal, "weight_change": cls.weight_change}
+
+    @classmethod
+    def compiled_pointwise(cls) -> dict[str, Any]:
+        """`teaching_signal` and `weight_change`, compiled."""
+        return cls._pointwise
 
     def __post_init__(self) -> None:
         real("learning_rate", self.learning_rate, low=0.0)
         real("momentum", self.momentum, low=0.0, high=1.0)
         if self.trace_decay is not None:
             real("trace_decay", self.trace_decay, low=0.0, high=1.0)
+        if self.decay_trials is not None:
+            whole("decay_trials", self.decay_trials, low=1, high=10**12)
 
-    def trace(self, neuron: Neuron) -> Trace:
-        """The presynaptic trace: the neuron's own, or the decay per bin that the user gave."""
-        return neuron.trace() if self.trace_decay is None else Trace(self.trace_decay)
+    def kernel(self, model: Model) -> PSPKernel:
+        """The presynaptic trace: the neuron's own, or the decay per bin that the user gave.
 
-    @abstractmethod
-    def mode(self, n_inputs: int) -> tuple[int, ...]:
+        Raises ValueError where `model` cannot learn by this rule.
+        """
+        own = model.psp_kernel()
+        if own is None:
+            raise ValueError(
+                f"{type(self).__name__} is for neurons whose potential is linear in their inputs; "
+                f"a {type(model).__name__} learns by BackPropagation"
+            )
+        return own if self.trace_decay is None else PSPKernel(self.trace_decay)
+
+    def parameters(self, model: Model, bounds: tuple[float, float]) -> tuple[float, ...]:
+        """The numbers of `RuleParameters`, and below them the rule's own."""
+        kernel = self.kernel(model)
+        decay = 0.0 if self.decay_trials is None else 1.0 / self.decay_trials
+        own = (float(getattr(self, name, 0.0)) for name in self.parameters_type._fields)
+        return (
+            self.learning_rate, self.momentum, *bounds,
+            kernel.slow, kernel.fast, kernel.scale, decay, *own,
+        )  # fmt: skip
+
+    def check_source(self, source: Any) -> None:
+        """ValueError if the rule cannot learn from what `source` tells."""
+        if self.feedback == "presentations" and source.labels_only:
+            raise ValueError(
+                f"{type(self).__name__} needs to know where the presentations were, and of these "
+                "trials only the labels are known: use a rule such as AggregateLabel or "
+                "CriticalThreshold"
+            )
+
+    def static(self, n_inputs: int) -> tuple[int, ...]:
         """Settings that are not numbers per lane; neurons side by side must share them."""
+        return (0,)
+
+
+def decay_option() -> Any:
+    """The field `decay_trials` of a rule: trials over which the rate falls to 0; None: never."""
+    return field(default=None, kw_only=True)

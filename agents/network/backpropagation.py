@@ -1,110 +1,79 @@
-"""Backpropagation of the error trace, compiled: what a trial teaches a network."""
+"""Backpropagation of the error trace, compiled: what a trial teaches networks side by side."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.kernels import Heard
-from agents.learning.momentum import apply_change
+from agents.learning.error_trace import error_at
 from agents.learning.rule import RuleParameters
-from agents.network.dynamics import Log, Row, Table, Wiring
-from agents.network.parameters import BackPropagation
-from gnm_env.compiled import compiled
+from agents.network.dynamics import NetworkParams
+from agents.simd import any_lane, full, load, negated, store, unpack, where
+from agents.training.slots import WIDTH
+from agents.training.trial import ModelBlock, RuleBlock, Scratch, TrialLog
+from gnm_env.compiled import compiled, inlined
+from gnm_env.rules import compiled_rising as rising
+from gnm_env.segments import TrialArrays
+
+N_COMMON = len(RuleParameters._fields)
 
 
-class Rule(NamedTuple):
-    """The parameters of the rule as compiled code takes them. Made by `rule_at`."""
+class RuleNumbers(NamedTuple):
+    """The rule's own numbers, one per lane; they follow those that all rules have."""
 
-    rate_hidden: float
-    rate_output: float
-    momentum: float
-    at_spikes: float
+    rate_hidden: Any
+    rate_output: Any
+    at_spikes: Any
     """1 where E in noise is −1 at output spikes only, else 0."""
-    lift_above: float
+    lift_above: Any
     """1 where E > 0 reaches bins above threshold too, else 0."""
-    max_step: float
+    max_step: Any
 
 
-def rule_row(settings: BackPropagation) -> tuple[float, ...]:
-    """The numbers of a Rule, in order; a group of networks keeps a row for each."""
-    return (
-        settings.learning_rate_hidden,
-        settings.learning_rate_output,
-        settings.momentum,
-        float(settings.noise_error == "spikes"),
-        float(settings.lift_above),
-        settings.max_step,
-    )
-
-
-@compiled
-def rule_at(rows: Table, n: int) -> Rule:
-    """Row `n` as a Rule."""
-    row = rows[n]
-    return Rule(row[0], row[1], row[2], row[3], row[4], row[5])
-
-
-@compiled
-def count_spikes(
-    theta_r: float, V: Row, heard: Heard, counts: NDArray[np.int64]
-) -> tuple[int, int]:
-    """Output spikes in each occurrence, into `counts`; returns those in patterns and in noise."""
-    in_patterns = 0
-    in_noise = 0
-    before = 0.0
-    k = 0
-    count = 0
-    for t in range(len(heard.offsets) - 1):
-        if k < len(heard.onsets) and t == heard.onsets[k] + heard.pattern_bins:
-            counts[k] = count
-            in_patterns += count
-            count = 0
-            k += 1
-        spike = 1 if V[t] >= theta_r and before < theta_r else 0
-        before = V[t]
-        if k < len(heard.onsets) and t >= heard.onsets[k]:
-            count += spike
-        else:
-            in_noise += spike
-    if k < len(heard.onsets):  # a trial of the user's own may end with a pattern
-        counts[k] = count
-        in_patterns += count
-    return in_patterns, in_noise
+@inlined
+def error_in(
+    p: RuleNumbers,
+    theta_r: Any,
+    trial: TrialArrays,
+    log: TrialLog,
+    segment: int,
+    t: int,
+    zero: Any,
+) -> Any:
+    """The error trace E(t) as the rule's options have it."""
+    E = error_at(trial.target, log.counts, log.above, segment, t, zero)
+    if segment % 2 == 1:
+        above = load(log.above, t, zero) > 0.0
+        return where(above & (E > 0.0) & (p.lift_above == 0.0), zero, E)
+    before = load(log.V, t - 1, zero) if t > 0 else zero
+    return where(rising(theta_r, load(log.V, t, zero), before) | (p.at_spikes == 0.0), E, zero)
 
 
 @compiled
-def error_trace(
-    rule: Rule, theta_r: float, V: Row, heard: Heard, counts: NDArray[np.int64], E: Row
-) -> bool:
-    """E(t), into `E`; returns whether it is anything but zero."""
-    blamed = False
-    before = 0.0
-    k = 0
-    for t in range(len(heard.offsets) - 1):
-        if k < len(heard.onsets) and t == heard.onsets[k] + heard.pattern_bins:
-            k += 1
-        above = V[t] >= theta_r
-        error = 0.0
-        if k < len(heard.onsets) and t >= heard.onsets[k]:
-            error = float(heard.owed[k] - counts[k])
-            if error > 0.0 and above and rule.lift_above == 0.0:
-                error = 0.0
-        elif above and (rule.at_spikes == 0.0 or before < theta_r):
-            error = -1.0
-        before = V[t]
-        E[t] = error
-        blamed = blamed or error != 0.0
-    return blamed
+def error_trace_of(
+    p: RuleNumbers, theta_r: float, V: NDArray[np.float64], trial: TrialArrays
+) -> NDArray[np.float64]:
+    """E(t) of one network in a trial, (T,), from the potential V (T,) of its readout."""
+    n_bins, n_segments = len(V), len(trial.target)
+    potential, above = V.copy().reshape(n_bins, 1), np.zeros((n_bins, 1))
+    log = TrialLog(potential, above, above, np.zeros((n_segments, 1)))
+    E = np.zeros(n_bins)
+    for segment in range(n_segments):
+        for t in range(trial.edges[segment], trial.edges[segment + 1]):
+            above[t, 0] = 1.0 if theta_r <= V[t] else 0.0
+            log.counts[segment, 0] += rising(theta_r, V[t], V[t - 1] if t > 0 else 0.0)
+    for segment in range(n_segments):
+        for t in range(trial.edges[segment], trial.edges[segment + 1]):
+            E[t] = error_in(p, theta_r, trial, log, segment, t, 0.0)
+    return E
 
 
-@compiled
-def backpropagate(
-    wiring: Wiring, weights: Row, heard: Heard, log: Log, E: Row, gradient: Row
+def backpropagated_change(
+    rule: RuleBlock, model: ModelBlock, trial: TrialArrays, log: TrialLog, scratch: Scratch
 ) -> None:
-    """∂J/∂w of J = Σ_t E(t) V(t), into `gradient`, which is laid out as `weights` is.
+    """λ ∂J/∂w of J = Σ_t E(t) V(t), clipped in length, in the lanes whose correction is not 0.
 
     Backward in time, with g(x) for the derivative of J by the variable x:
 
@@ -114,81 +83,76 @@ def backpropagate(
         ∂J/∂u_k = Σ_t g(V(t)) j_k(t),   ∂J/∂W_ik = Σ_t g(v_k(t)) s_i(t)
 
     Without a hidden layer ∂J/∂u_i = Σ_t g(V(t)) s_i(t): the eligibility of error-trace learning.
+    Lanes in which E is 0 throughout learn nothing: their correction becomes 0.
     """
-    H = wiring.hidden
-    keep = 1.0 - wiring.alpha
-    keep_current = 1.0 - wiring.kappa
-    u = weights[wiring.n_inputs * H :]
-    g_u = gradient[wiring.n_inputs * H :]
-    g_j = np.zeros(H)
-    g_v = np.zeros(H)
-    g_V = 0.0
-    gradient[:] = 0.0
-    for t in range(len(heard.offsets) - 2, -1, -1):
-        g_V = E[t] + keep * g_V
-        if H == 0:
-            for e in range(heard.offsets[t], heard.offsets[t + 1]):
-                gradient[heard.channels[e]] += g_V
-            continue
-        total = 0.0
-        for k in range(H):
-            total += g_v[k]
-        for k in range(H):
-            g_u[k] += g_V * log.currents[t, k]
-            g_j[k] = u[k] * g_V + keep_current * g_j[k]
-            g_z = g_j[k] - wiring.inhibition * (total - g_v[k])
-            g_v[k] = log.slopes[t, k] * g_z + keep * g_v[k]
-        for e in range(heard.offsets[t], heard.offsets[t + 1]):
-            g_W = gradient[heard.channels[e] * H : (heard.channels[e] + 1) * H]
-            for k in range(H):
-                g_W[k] += g_v[k]
+    zero = full(0.0, WIDTH)
+    numbers = unpack(RuleNumbers, rule.parameters[N_COMMON:], zero)
+    p = unpack(NetworkParams, model.parameters, zero)
+    weights, notes, gradient = model.arrays.weights, model.arrays.notes, scratch.change
+    n_inputs, H = model.static[0], model.static[1]
+    u = n_inputs * H
+    keep = 1.0 - p.alpha
+    keep_current = 1.0 - p.kappa
+    for i in range(len(gradient)):
+        store(gradient, i, zero)
+    g_j = np.zeros((H, WIDTH))
+    g_v = np.zeros((H, WIDTH))
+    g_V = zero
+    blame = zero
+    for segment in range(len(trial.target) - 1, -1, -1):
+        for t in range(trial.edges[segment + 1] - 1, trial.edges[segment] - 1, -1):
+            E = error_in(numbers, p.theta_r, trial, log, segment, t, zero)
+            blame = where(E != 0.0, 1.0, blame)
+            g_V = E + keep * g_V
+            if H == 0:
+                for e in range(trial.offsets[t], trial.offsets[t + 1]):
+                    i = trial.channels[e]
+                    store(gradient, i, load(gradient, i, zero) + g_V)
+            else:
+                row = 2 * H * t
+                total = zero
+                for k in range(H):
+                    total = total + load(g_v, k, zero)
+                for k in range(H):
+                    of_current = load(gradient, u + k, zero) + g_V * load(notes, row + H + k, zero)
+                    store(gradient, u + k, of_current)
+                    g = load(weights, u + k, zero) * g_V + keep_current * load(g_j, k, zero)
+                    store(g_j, k, g)
+                    before = load(g_v, k, zero)
+                    g_z = g - p.inhibition * (total - before)
+                    store(g_v, k, load(notes, row + k, zero) * g_z + keep * before)
+                for e in range(trial.offsets[t], trial.offsets[t + 1]):
+                    W = trial.channels[e] * H
+                    for k in range(H):
+                        store(gradient, W + k, load(gradient, W + k, zero) + load(g_v, k, zero))
+    factor = load(scratch.rates, 0, zero)
+    for i in range(u):
+        store(gradient, i, factor * numbers.rate_hidden * load(gradient, i, zero))
+    for i in range(u, len(gradient)):
+        store(gradient, i, factor * numbers.rate_output * load(gradient, i, zero))
+    clip_by_norm(gradient, numbers.max_step, zero)
+    c = load(scratch.corrections, 0, zero)
+    store(scratch.corrections, 0, where(blame > 0.0, c, zero))
 
 
-@compiled
-def shorten(change: Row, max_step: float) -> None:
-    """Scale `change` down to the length `max_step` if it is longer."""
-    largest = 0.0
+@inlined
+def clip_by_norm(change: NDArray[np.float64], max_step: Any, zero: Any) -> None:
+    """Scale the `change` of each network down to the length `max_step` where it is longer."""
+    largest = zero
     for i in range(len(change)):
-        largest = max(largest, abs(change[i]))
-    if largest == 0.0 or max_step == np.inf:
-        return
+        size = load(change, i, zero)
+        size = where(size < 0.0, zero - size, size)
+        largest = where(size > largest, size, largest)
     # Squares of numbers up to 1 do not overflow. What is infinite or NaN already becomes NaN.
-    total = 0.0
+    scale = where(largest == 0.0, 1.0, largest)
+    total = zero
     for i in range(len(change)):
-        total += (change[i] / largest) ** 2
+        part = load(change, i, zero) / scale
+        total = total + part * part
     length = largest * np.sqrt(total)
-    if not length <= max_step:
+    short = (length <= max_step) | (max_step == np.inf)
+    if any_lane(negated(short)):
+        factor = where(short, 1.0, max_step / length)
         for i in range(len(change)):
-            change[i] *= max_step / length
-
-
-@compiled
-def learn_trial(
-    wiring: Wiring,
-    rule: Rule,
-    heard: Heard,
-    log: Log,
-    counts: NDArray[np.int64],
-    E: Row,
-    gradient: Row,
-    weights: Row,
-    previous: Row,
-) -> bool:
-    """The learning step after a trial. Returns False if a weight would have overflowed.
-
-    If E is zero throughout, nothing changes, the previous change included.
-    """
-    if not error_trace(rule, wiring.theta_r, log.V, heard, counts, E):
-        return True
-    backpropagate(wiring, weights, heard, log, E, gradient)
-    n_hidden = wiring.n_inputs * wiring.hidden
-    for i in range(n_hidden):
-        gradient[i] *= rule.rate_hidden
-    for i in range(n_hidden, len(gradient)):
-        gradient[i] *= rule.rate_output
-    shorten(gradient, rule.max_step)
-    p = RuleParameters(rule.rate_output, rule.momentum, -np.inf, np.inf, 0.0, 0.0, 1.0)
-    sound: bool = apply_change(
-        p, True, gradient.reshape(-1, 1), weights.reshape(-1, 1), previous.reshape(-1, 1)
-    )
-    return sound
+            part = load(change, i, zero)
+            store(change, i, where(short, part, part * factor))

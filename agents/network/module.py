@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.kernels import Heard
-from agents.network import backpropagation
+from agents.network.backpropagation import error_trace_of
 from agents.network.dynamics import largest_ratio
 from agents.network.network_agent import NetworkAgent
 from agents.network.parameters import BackPropagation, Network
@@ -186,21 +184,14 @@ def error_traces(
     weights is what a NetworkAgent learns from these trials. 0 beyond the end of each trial.
     """
     potentials = V.detach().to("cpu", torch.float64).numpy()[:, :, 0]
-    settings = backpropagation.rule_row(BackPropagation() if rule is None else rule)
+    if len(potentials) != len(trials) or potentials.shape[1] < max(t.n_bins for t in trials):
+        raise ValueError(
+            f"V must have shape (batch, T, 1) for {len(trials)} trials of up to "
+            f"{max(t.n_bins for t in trials)} bins, got {tuple(V.shape)}"
+        )
+    numbers = (BackPropagation() if rule is None else rule).numbers()
     E = np.zeros_like(potentials)
     for k, trial in enumerate(trials):
-        _fill_error_trace(
-            settings, network.theta_r, np.ascontiguousarray(potentials[k]), trial, E[k]
-        )
+        of_trial = np.ascontiguousarray(potentials[k, : trial.n_bins])
+        E[k, : trial.n_bins] = error_trace_of(numbers, network.theta_r, of_trial, trial.arrays)
     return torch.from_numpy(E).to(V)[:, :, None]
-
-
-def _fill_error_trace(
-    settings: tuple[float, ...], theta_r: float, V: Any, trial: Trial, E: Any
-) -> None:
-    heard = Heard(trial.channels, trial.offsets, trial.onsets, trial.targets, trial.pattern_bins)
-    counts = np.empty(len(trial.onsets), np.int64)
-    backpropagation.count_spikes(theta_r, V, heard, counts)
-    backpropagation.error_trace(
-        backpropagation.rule_at(np.array([settings]), 0), theta_r, V, heard, counts, E
-    )

@@ -7,6 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from agents import registry
+from agents.learning.rule import Rule, decay_option
+from agents.model import Model, PSPKernel
+from agents.network.backpropagation import RuleNumbers, backpropagated_change
+from agents.network.dynamics import NetworkParams, State, advance, largest_ratio
 from gnm_env.checks import choice, real, whole
 
 MAX_HIDDEN = 10_000
@@ -16,7 +21,7 @@ NOISE_ERRORS = ("above", "spikes")
 
 
 @dataclass(frozen=True)
-class Network:
+class Network(Model):
     """A hidden layer of GNM neurons (η = 0), and a GNM neuron that reads it out.
 
     With the input spikes s, the weights W (N, H) and u (H,), and all else 0 before the first bin:
@@ -51,6 +56,13 @@ class Network:
 
     name: ClassVar[str] = "network"
     default_initial_weight: ClassVar[float] = 0.3
+    parameters_type: ClassVar[type] = NetworkParams
+    state_type: ClassVar[type] = State
+    widest: ClassVar[int] = 8
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        registry.register("network", cls, ("advance",))
 
     def __post_init__(self) -> None:
         if self.hidden is not None:
@@ -72,6 +84,33 @@ class Network:
         """The readout's threshold for an output spike."""
         return self.theta_r
 
+    def parameters(self) -> tuple[float, ...]:
+        return (
+            self.alpha, self.inhibition, self.kappa, self.theta_b, self.h, self.theta_r,
+            largest_ratio(self.h),
+        )  # fmt: skip
+
+    def static(self, n_inputs: int) -> tuple[int, ...]:
+        """Inputs, hidden neurons, and whether the Hill exponent is the usual one, 4."""
+        return (n_inputs, self.width, int(self.h == 4.0))
+
+    def advance(self) -> tuple[str, Any]:
+        return "network", advance
+
+    def n_weights(self, n_inputs: int) -> int:
+        """N·H + H, or N without a hidden layer."""
+        return (n_inputs + 1) * self.width or n_inputs
+
+    @property
+    def n_memory(self) -> int:
+        """v, z and j of the hidden neurons."""
+        return 3 * self.width
+
+    @property
+    def n_notes(self) -> int:
+        """H'(v) and j of the hidden neurons, in each bin."""
+        return 2 * self.width
+
 
 def _checked_hidden(value: Any) -> int:
     try:
@@ -83,7 +122,7 @@ def _checked_hidden(value: Any) -> int:
 
 
 @dataclass(frozen=True)
-class BackPropagation:
+class BackPropagation(Rule):
     """Backpropagation of the error trace (BP): ascend J = Σ_t E(t) V(t), with E held fixed.
 
     E(t) is, over each occurrence of a pattern, the spikes that it is owed less those given in it,
@@ -102,6 +141,7 @@ class BackPropagation:
             there for ever.
         max_step: longest step that one trial may cause, momentum aside: the Euclidean length of the
             change of all weights together; infinity sets no limit.
+        decay_trials: trials over which the learning rates fall to 0 in a line; None: constant.
     """
 
     learning_rate_hidden: float = 3e-3
@@ -110,14 +150,43 @@ class BackPropagation:
     noise_error: str = "above"
     lift_above: bool = False
     max_step: float = 0.3
+    decay_trials: int | None = decay_option()
 
     name: ClassVar[str] = "bp"
+    feedback: ClassVar[str] = "presentations"
+    uses_error: ClassVar[bool] = True
+    parameters_type: ClassVar[Any] = RuleNumbers
+    block_change: ClassVar[Any] = backpropagated_change
+    learning_rate: ClassVar[float] = 1.0  # type: ignore[misc]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("learning_rate_hidden", "learning_rate_output"):
             real(name, getattr(self, name), low=0.0)
-        real("momentum", self.momentum, low=0.0, high=1.0)
         choice("noise_error", self.noise_error, NOISE_ERRORS)
         if not isinstance(self.lift_above, (bool, np.bool_)):
             raise ValueError(f"lift_above must be True or False, got {self.lift_above!r}")
         real("max_step", self.max_step, above=0.0, finite=False)
+
+    def kernel(self, model: Model) -> PSPKernel:
+        """None is needed: the gradient runs through the network itself."""
+        if not isinstance(model, Network):
+            raise ValueError(
+                f"BackPropagation trains a Network; for {type(model).__name__} take another rule, "
+                "such as ErrorTrace, which is the same without a hidden layer"
+            )
+        return PSPKernel(0.0)
+
+    def parameters(self, model: Model, bounds: tuple[float, float]) -> tuple[float, ...]:
+        common = super().parameters(model, bounds)[: -len(RuleNumbers._fields)]
+        return (*common, *self.numbers())
+
+    def numbers(self) -> RuleNumbers:
+        """What is its own, as compiled code takes it."""
+        return RuleNumbers(
+            float(self.learning_rate_hidden),
+            float(self.learning_rate_output),
+            float(self.noise_error == "spikes"),
+            float(self.lift_above),
+            float(self.max_step),
+        )

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.neurons.neuron import Neuron, Response, Trace
-from agents.simd import any_lane, like, negated, power, where
+from agents.neurons.neuron import Neuron, PSPKernel, Response
+from agents.simd import any_lane, like, power, where, whole_power
 from gnm_env.checks import choice, real
-from gnm_env.compiled import compiled, specialise
+from gnm_env.compiled import specialise
+from gnm_env.rules import compiled_rising as rising
 
 LARGEST_WHOLE = 4096
 """Largest exponent that is raised by repeated squaring; above it `pow` is as good."""
@@ -42,19 +43,7 @@ class State(NamedTuple):
     X: Any
 
 
-@compiled
-def whole_power(x: Any, exponent: int) -> Any:
-    """x**exponent by repeated squaring."""
-    result = like(1.0, x)
-    while exponent > 0:
-        if exponent & 1:
-            result = result * x
-        x = x * x
-        exponent >>= 1
-    return result
-
-
-def hill_template(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
+def hill_template(p: Parameters, static: tuple[int, ...], V: Any) -> Any:
     """H(V) = V^h / (ϑ_B^h + V^h), 0 for V <= 0; a step with ½ at V = ϑ_B for infinite h.
 
     Far from ϑ_B the function is flat to within rounding, and the power is not computed.
@@ -65,7 +54,7 @@ def hill_template(p: Parameters, mode: tuple[int, ...], V: Any) -> Any:
     H = where(u > 1.0, 1.0, like(0.0, V))
     steep = (u > p.flat_below) & (u < p.flat_above)
     if any_lane(steep):
-        u_h = whole_power(u, mode[1]) if RECOVERY == WHOLE else power(u, p.h)
+        u_h = whole_power(u, static[1]) if RECOVERY == WHOLE else power(u, p.h)
         H = where(steep, u_h / (1.0 + u_h), H)
     return H
 
@@ -74,7 +63,7 @@ hill: Any = hill_template
 
 
 def step_template(
-    p: Parameters, mode: tuple[int, ...], state: State, drive: Any
+    p: Parameters, static: tuple[int, ...], state: State, current: Any
 ) -> tuple[State, Response]:
     """One bin. With everything on the right taken at t−1 but the input I(t):
 
@@ -85,12 +74,11 @@ def step_template(
     D = p.leak * state.V
     if RECOVERY != NONE:
         D = p.eta_gamma * state.R * state.V + D
-        R = state.R + p.zeta * hill(p, mode, state.V) - p.beta * state.R
-    V = state.V + drive - D
-    X = V if mode[0] == 0 else D
-    above = p.theta_r <= X
-    spike = above & negated(p.theta_r <= state.X)
-    return State(V, R, X), Response(V, D, R, X, above, spike)
+        R = state.R + p.zeta * hill(p, static, state.V) - p.beta * state.R
+    V = state.V + current - D
+    X = V if static[0] == 0 else D
+    spike = rising(p.theta_r, X, state.X)
+    return State(V, R, X), Response(V, D, R, X, p.theta_r <= X, spike)
 
 
 def _bound(recovery: str) -> Any:
@@ -162,11 +150,11 @@ class GNM(Neuron):
             2.0 ** (54.0 / self.h),
         )
 
-    def mode(self) -> tuple[int, ...]:
+    def static(self, n_inputs: int) -> tuple[int, ...]:
         """Whether the readout is D, and the exponent where it is whole."""
         return (int(self.readout == "D"), int(self.h) if self._recovery() == WHOLE else 0)
 
-    def step(self) -> tuple[str, Any]:
+    def compiled_step(self) -> tuple[str, Any]:
         return ("gnm_none", STEPS[NONE]) if self.eta == 0.0 else self.recording_step()
 
     def recording_step(self) -> tuple[str, Any]:
@@ -178,5 +166,5 @@ class GNM(Neuron):
             return INFINITE
         return WHOLE if self.h <= LARGEST_WHOLE and self.h == int(self.h) else REAL
 
-    def trace(self) -> Trace:
-        return Trace(1.0 - (1.0 - self.eta) * self.alpha)
+    def psp_kernel(self) -> PSPKernel:
+        return PSPKernel(1.0 - (1.0 - self.eta) * self.alpha)

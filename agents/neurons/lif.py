@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.neurons.neuron import Neuron, Response, Trace
+from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
 from gnm_env.checks import real, whole
 from gnm_env.compiled import compiled
@@ -24,13 +24,15 @@ class State(NamedTuple):
 
 
 @compiled
-def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tuple[State, Response]:
+def step(
+    p: Parameters, static: tuple[int, ...], state: State, current: Any
+) -> tuple[State, Response]:
     """One bin: V(t) = (1−α) V(t−1) + I(t); at V(t) >= ϑ a spike, V <- 0, and then a pause.
 
     The response holds V before the reset: it is what learning and the readout see.
     """
     D = p.alpha * state.V
-    V = state.V + where(state.waiting > 0.0, 0.0, drive) - D
+    V = state.V + where(state.waiting > 0.0, 0.0, current) - D
     spike = p.theta <= V
     waiting = where(spike, p.refractory, where(state.waiting > 0.0, state.waiting - 1.0, 0.0))
     return State(where(spike, 0.0, V), waiting), Response(V, D, state.waiting, V, spike, spike)
@@ -54,6 +56,7 @@ class LIF(Neuron):
     default_initial_weight: ClassVar[float] = 0.1
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
+    step: ClassVar[Any] = step
 
     def __post_init__(self) -> None:
         real("alpha", self.alpha, low=0.0, high=1.0)
@@ -64,11 +67,8 @@ class LIF(Neuron):
     def threshold(self) -> float:
         return self.theta
 
-    def step(self) -> tuple[str, Any]:
-        return "lif", step
-
     def parameters(self) -> tuple[float, ...]:
         return (self.alpha, self.theta, float(self.refractory))
 
-    def trace(self) -> Trace:
-        return Trace(1.0 - self.alpha)
+    def psp_kernel(self) -> PSPKernel:
+        return PSPKernel(1.0 - self.alpha)

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.neurons.neuron import Neuron, Response, Trace
-from agents.simd import negated, where
+from agents.neurons.neuron import Neuron, PSPKernel, Response
+from agents.simd import where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled
+from gnm_env.rules import compiled_rising as rising
 
 
 class Parameters(NamedTuple):
@@ -33,19 +34,20 @@ class State(NamedTuple):
 
 
 @compiled
-def step(p: Parameters, mode: tuple[int, ...], state: State, drive: Any) -> tuple[State, Response]:
+def step(
+    p: Parameters, static: tuple[int, ...], state: State, current: Any
+) -> tuple[State, Response]:
     """One bin: V(t) = V_norm Σ_j w [e^(−(t−t_j)/τ_m) − e^(−(t−t_j)/τ_s)] − ϑ Σ_s e^(−(t−t_s)/τ_m).
 
     Three decaying sums carry the whole history of input spikes t_j and output spikes t_s.
     """
-    slow = p.slow * state.slow + drive
-    fast = p.fast * state.fast + drive
+    slow = p.slow * state.slow + current
+    fast = p.fast * state.fast + current
     D = p.theta * state.reset
     V = p.scale * (slow - fast) - D
-    above = p.theta <= V
-    spike = above & negated(p.theta <= state.V)
+    spike = rising(p.theta, V, state.V)
     reset = p.slow * (state.reset + where(spike, 1.0, 0.0))
-    return State(slow, fast, reset, V), Response(V, D, state.reset, V, above, spike)
+    return State(slow, fast, reset, V), Response(V, D, state.reset, V, p.theta <= V, spike)
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class MST(Neuron):
     default_initial_weight: ClassVar[float] = 0.02
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
+    step: ClassVar[Any] = step
 
     def __post_init__(self) -> None:
         real("tau_m", self.tau_m, above=0.0)
@@ -87,14 +90,14 @@ class MST(Neuron):
         k = self.tau_m / self.tau_s
         return float(k ** (k / (k - 1.0)) / (k - 1.0))
 
-    def step(self) -> tuple[str, Any]:
-        return "mst", step
-
     def parameters(self) -> tuple[float, ...]:
-        trace = self.trace()
-        return (trace.slow, trace.fast, trace.scale, self.theta)
+        kernel = self.psp_kernel()
+        return (kernel.slow, kernel.fast, kernel.scale, self.theta)
 
-    def trace(self) -> Trace:
-        return Trace(
-            math.exp(-1.0 / self.tau_m), math.exp(-1.0 / self.tau_s), self.v_norm, double=True
+    def psp_kernel(self) -> PSPKernel:
+        return PSPKernel(
+            math.exp(-1.0 / self.tau_m),
+            math.exp(-1.0 / self.tau_s),
+            self.v_norm,
+            biexponential=True,
         )

@@ -1,83 +1,109 @@
-"""What every neuron offers: parameters that check themselves, and one compiled step.
+"""What every neuron offers: parameters that check themselves, and one step.
 
-A neuron is one file beside this one. It holds
+A neuron is one file beside this one, or a class of your own. It holds
 
-- a frozen dataclass, derived from `Neuron`, with the parameters that a user sets;
-- `Parameters`, a NamedTuple of the numbers that the step needs, one per lane;
+- a frozen dataclass, derived from `Neuron`, with the parameters that a user sets, a `name`, a
+  `threshold` and a `psp_kernel`;
 - `State`, a NamedTuple of what passes from bin to bin; all zeros at the beginning of a trial;
-- `step(p, mode, state, drive) -> (state, Response)`: one bin, compiled, for one neuron or for many
-  side by side (see `agents.simd`). `drive` is I(t), the weighted input of the bin.
+- `step(p, static, state, current) -> (state, Response)`: one bin, for one neuron or for many side
+  by side. `current` is I(t), the weighted input of the bin; `p` holds the parameters by name.
 
-The dataclass names the two types in `parameters_type` and `state_type`; its method `step` gives the
-compiled step that suits its parameters.
+The dataclass names the type of its state in `state_type` and its step in `step`. It is written for
+plain numbers; what it may use is listed in `agents.simd`.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
+from agents import registry
+from agents.model import Arrays, Model, PSPKernel, Response
+from agents.portable import portable
+from agents.simd import like, load
+from gnm_env.compiled import inlined, specialise
 
-class Response(NamedTuple):
-    """What a neuron shows in one bin; units of membrane potential unless said otherwise."""
+__all__ = ["Neuron", "PSPKernel", "Response"]
 
-    V: Any
-    """Membrane potential, before any reset that the bin's spike causes."""
-    D: Any
-    """What the bin took away from the membrane potential: decay, or a soft reset."""
-    R: Any
-    """The neuron's own reset variable (dimensionless; bins for a refractory period)."""
-    X: Any
-    """Readout, compared with the threshold."""
-    above: Any
-    """Whether the readout is at or above the threshold."""
-    spike: Any
-    """Whether an output spike falls into this bin."""
+step: Any = None  # bound by `_advance`
 
 
-class Trace(NamedTuple):
-    """The presynaptic trace: a neuron's linear response to one unit input spike, t bins later.
-
-    slow^t if `double` is false, else scale·(slow^t − fast^t).
-    """
-
-    slow: float
-    fast: float = 0.0
-    scale: float = 1.0
-    double: bool = False
+@inlined
+def input_current(weights: Any, channels: Any, first: int, last: int, zero: Any) -> Any:
+    """I(t) = Σ_i w_i s_i(t), summed from 0 over the ascending channels[first:last]."""
+    current = zero
+    for e in range(first, last):
+        current = current + load(weights, channels[e], zero)
+    return current
 
 
-class Neuron(ABC):
-    """Base of all neurons. Each adds its fields as a frozen dataclass."""
+def advance_template(
+    p: Any,
+    static: Any,
+    arrays: Arrays,
+    state: Any,
+    channels: Any,
+    first: int,
+    last: int,
+    row: int,
+) -> Any:
+    """One bin of any neuron: its input current, and its step."""
+    zero = like(0.0, state[0])
+    current = input_current(arrays.weights, channels, first, last, zero)
+    return step(p, static, state, current)
 
-    name: ClassVar[str]
-    default_initial_weight: ClassVar[float]
-    parameters_type: ClassVar[type]
-    state_type: ClassVar[type]
-    graded: ClassVar[bool] = False
-    """Whether the output of a bin is an amount instead of a spike."""
 
-    @abstractmethod
+class _NumericFields:
+    """The default of `parameters_type`: a NamedTuple of the numeric fields of the dataclass."""
+
+    def __get__(self, instance: Any, owner: type) -> type:
+        numbers = [f.name for f in fields(owner) if f.type in ("float", "int", float, int)]
+        made = NamedTuple("Parameters", [(name, Any) for name in numbers])  # type: ignore[misc]
+        # Where the compile cache finds it again.
+        made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.Parameters"
+        owner.Parameters = owner.parameters_type = made  # type: ignore[attr-defined]
+        return made
+
+
+class Neuron(Model):
+    """Base of all neurons: models with one weight per input channel, linear in their inputs."""
+
+    parameters_type: ClassVar[Any] = _NumericFields()
+    step: ClassVar[Any]
+    """step(p, static, state, current) -> (state, Response); see the module."""
+    _compiled: ClassVar[tuple[str, Any]]
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        registry.register("neuron", cls, ("step", "advance", "compiled_step"))
+        if "step" in vars(cls):
+            cls._compiled = (cls.name, portable(cls.step))
+
     def parameters(self) -> tuple[float, ...]:
-        """The numbers of `parameters_type`, in order."""
+        """The fields of the dataclass, in order; a neuron that needs other numbers overrides it."""
+        return tuple(float(getattr(self, name)) for name in self.parameters_type._fields)
 
-    @abstractmethod
-    def trace(self) -> Trace:
-        """The neuron's own presynaptic trace."""
-
-    @property
-    @abstractmethod
-    def threshold(self) -> float:
-        """The readout's threshold for an output spike."""
-
-    @abstractmethod
-    def step(self) -> tuple[str, Any]:
-        """The compiled step, and a name that tells it from every other step."""
+    def compiled_step(self) -> tuple[str, Any]:
+        """The step, compiled, and a name that tells it from every other."""
+        return self._compiled
 
     def recording_step(self) -> tuple[str, Any]:
-        """The step that computes every variable, also those that do not act back."""
-        return self.step()
+        """As `compiled_step`: the step that computes every variable."""
+        return self.compiled_step()
 
-    def mode(self) -> tuple[int, ...]:
-        """Switches of the step that are not numbers; neurons side by side must share them."""
-        return (0,)
+    def advance(self) -> tuple[str, Any]:
+        return _advance(self.compiled_step())
+
+    def recording(self) -> tuple[str, Any]:
+        return _advance(self.recording_step())
+
+
+_ADVANCES: dict[Any, Any] = {}
+"""The bound template of each compiled step, so that it is compiled once."""
+
+
+def _advance(labelled: tuple[str, Any]) -> tuple[str, Any]:
+    label, compiled_step = labelled
+    if compiled_step not in _ADVANCES:
+        _ADVANCES[compiled_step] = specialise(advance_template, label, step=compiled_step)
+    return label, _ADVANCES[compiled_step]

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.checkpoint import atomic_write
 from agents.rl.recipes import RECIPES
 from agents.rl.sb3_agent import SB3Agent
 from agents.rl.senses import Senses
 from gnm_env.checks import choice
+from gnm_env.files import atomic_write
 from gnm_env.task import Patterns, Task
 
 FORMAT = 1

@@ -1,22 +1,22 @@
 """Compiled steps of the vector environments: one call for all environments and everything in them.
 
-Most bins hold no spike, so that most environments have little to do in a step: their bins and their
-output are counted on, all at once. `clock` has a row for each number that this takes, uint32
-(4, n): the bin shown, the bin at which the environment needs a look (its next spike, or an end),
-the next of its events, and the bin at which the episode is truncated.
+Most bins hold no spike, so that most environments have little to do in a step: the step counters
+and the output of all are counted on at once, and only the environments that are pending, since a
+spike or an end falls into the bin, are looked at one by one.
 
 The spikes of an environment wait in its row of `events`. An event is a bin and a channel in one
-number: bin · 2^shift + channel; channel 2^shift − 1 marks the end of what was drawn. Occurrences
-wait in a row of `parts`: first bin · 2^32 + class. A row that proves too short makes all rows
-longer. Every environment draws from a generator of its own: what it hears depends on no others.
-`shown` are the places of all ones in the observations, which the next step clears again.
+number: bin · 2^shift + channel; channel 2^shift − 1 marks the end of what was drawn. The segments
+of its trial wait in rows beside it. A row that proves too short makes all rows longer. Every
+environment draws from a generator of its own: what it hears depends on no others. `shown` are the
+places of all ones in the observations, which the next step clears again.
 
-All of this is in one struct, since an argument costs a compiled call as much as some environments.
+All of this is in one record, since an argument costs a compiled call as much as some environments.
+Its parts are records in turn, by meaning; those that change hold their arrays by reference.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -25,57 +25,156 @@ from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled
 from gnm_env.sampling import DRAFT
-from gnm_env.task import TaskArrays
 
 NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2
 COST, SIGN, DENSE = 0, 1, 2
-NO_LIMIT = 2**30
-"""Stands for an episode of any length; bins are counted in 32 bits."""
 
 
-@structref.register
-class CrowdType(types.StructRef):
-    """Numba's type of a Crowd."""
+class Config(NamedTuple):
+    """What never changes."""
+
+    autoreset: int
+    limit: int
+    """Bins after which an episode is truncated."""
+    most: float
+    """Greatest action."""
+    feedback: int
+    tolerance: float
+    shift: int
+    """Bits for a channel in an event."""
+
+
+class StepCounters(NamedTuple):
+    """What is counted in bins or events, uint32 (n,) each."""
+
+    bin_: NDArray[np.uint32]
+    """The bin shown."""
+    pending_bin: NDArray[np.uint32]
+    """The bin at which the environment needs a look: its next spike, or an end."""
+    event: NDArray[np.uint32]
+    """The next of its events."""
+    deadline: NDArray[np.uint32]
+    """The bin at which the episode is truncated."""
+
+
+class Episodes(NamedTuple):
+    """The state of each episode."""
+
+    records: NDArray[Any]
+    """(n,) of TRIAL_STATE or STREAM_STATE."""
+    emitted: NDArray[Any]
+    """Output in the present trial, (n,)."""
+
+
+class DisplayArrays(NamedTuple):
+    """What is seen."""
+
+    observations: NDArray[np.int8]
+    """(n, N)."""
+    final_obs: NDArray[np.int8]
+    """Last observations of the episodes that are done, under SAME_STEP."""
+    shown: NDArray[np.uint64]
+    """Places of the ones in `observations`."""
+
+
+class OutcomeArrays(NamedTuple):
+    """What the last step told."""
+
+    done: NDArray[np.int64]
+    """The environments whose episodes are done stand at its beginning."""
+    results: Any
+    """TrialResults or StreamResults."""
+    heads: NDArray[np.int64]
+    """(n, 6), for each trial in `report`: the environment, where its four lists begin, the end."""
+
+
+class Growing(NamedTuple):
+    """What a step may exchange for something longer, or count on; all that a copy needs to know."""
+
+    events: NDArray[Any]
+    """int32 or int64 (n, width)."""
+    edges: NDArray[np.int64]
+    """Segments of the present trial, a row each; see `gnm_env.segments`."""
+    target: NDArray[np.int64]
+    classes: NDArray[np.int64]
+    report: NDArray[np.int64]
+    """Onsets, classes, targets and ends of each trial that the last step ended."""
+    n_shown: int
+    n_done: int
+    n_told: int
+
+
+class _Record(types.StructRef):
+    """Numba's type of a record."""
 
     def preprocess_fields(self, fields: Any) -> Any:
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
-class Crowd(structref.StructRefProxy):
-    """All that the environments have between steps, for compiled code; made by `new_crowd`."""
+class _Proxy(structref.StructRefProxy):
+    """A record as Python sees it; compiled code makes it from its parts by name."""
+
+    if TYPE_CHECKING:
+
+        def __new__(cls, **parts: Any) -> Any: ...
 
 
-structref.define_boxing(CrowdType, Crowd)
+@structref.register
+class AheadType(_Record):
+    """Type of Ahead."""
+
+
+class Ahead(_Proxy):
+    """What waits to be shown, a row for each environment; as in Growing."""
+
+
+structref.define_constructor(Ahead, AheadType, ["events", "edges", "target", "classes"])
+
+
+@structref.register
+class DisplayType(_Record):
+    """Type of Display."""
+
+
+class Display(_Proxy):
+    """What is seen; as in DisplayArrays and Growing."""
+
+
 structref.define_constructor(
-    Crowd,
-    CrowdType,
+    Display, DisplayType, ["observations", "final_obs", "shown", "n_shown"]
+)
+
+
+@structref.register
+class OutcomeType(_Record):
+    """Type of Outcome."""
+
+
+class Outcome(_Proxy):
+    """What the last step told; as in OutcomeArrays and Growing."""
+
+
+structref.define_constructor(
+    Outcome, OutcomeType, ["done", "n_done", "results", "report", "heads", "n_told"]
+)
+
+
+@structref.register
+class RoomType(_Record):
+    """Type of Room."""
+
+
+class Room(_Proxy):
+    """Room for what is drawn and for lists of environments; nothing in it outlives a step."""
+
+
+structref.define_constructor(
+    Room,
+    RoomType,
     [
-        "held",  # the generators
-        "task",
-        "autoreset",
-        "limit",  # bins after which an episode is truncated
-        "most",  # greatest action
-        "feedback",
-        "tolerance",
-        "clock",
-        "state",  # TRIAL_STATE or STREAM_STATE (n,)
-        "emitted",  # output in the present trial (n,)
-        "events",  # int32 or int64 (n, width)
-        "shift",
-        "parts",  # int64 (n, width)
-        "observations",  # int8 (n, N)
-        "shown",
-        "n_shown",
-        "over",  # over[:n_over]: the environments that the last step ended
-        "n_over",
-        "finals",  # their last observations, under SAME_STEP
-        "results",  # TrialResults or StreamResults of the last step
-        "report",  # of the trials that it ended: onsets, classes and targets of each
-        "heads",  # int64 (n, 5): environment, where these three begin, and their end
-        "n_told",  # number of these trials
-        "looks",  # room for a number per environment, and again
-        "ended",
-        "channels",  # room for what is drawn
+        "pending",  # environments that are to be looked at
+        "ended",  # those that are found at an end
+        "channels",
         "offsets",
         "onsets",
         "classes",
@@ -84,37 +183,98 @@ structref.define_constructor(
 )
 
 
+@structref.register
+class VectorStateType(_Record):
+    """Type of VectorState."""
+
+
+class VectorState(_Proxy):
+    """All that the environments have between steps, for compiled code; made by `new_state`."""
+
+
+structref.define_boxing(VectorStateType, VectorState)
+structref.define_constructor(
+    VectorState,
+    VectorStateType,
+    [
+        "rngs",  # the generators
+        "source",  # where trials come from: a task, or a data set
+        "config",
+        "counters",
+        "episodes",
+        "ahead",
+        "display",
+        "outcome",
+        "room",
+    ],
+)
+
+
 @compiled
-def new_crowd(
-    held: Any,
-    task: TaskArrays,
-    autoreset: int,
-    limit: int,
-    most: float,
-    feedback: int,
-    tolerance: float,
-    state: Any,
-    emitted: NDArray[Any],
-    events: NDArray[Any],
-    observations: NDArray[np.int8],
-    over: NDArray[np.int64],
-    finals: NDArray[np.int8],
-    results: Any,
-    heads: NDArray[np.int64],
+def new_state(
+    rngs: Any,
+    source: Any,
+    config: Config,
+    counters: StepCounters,
+    episodes: Episodes,
+    display: DisplayArrays,
+    outcome: OutcomeArrays,
+    growing: Growing,
 ) -> Any:
-    """A Crowd in which no environment has begun."""
-    n = observations.shape[0]
-    return Crowd(
-        held, task, autoreset, limit, most, feedback, tolerance,
-        np.zeros((4, n), np.uint32), state, emitted,
-        events, event_shift(observations.shape[1]), np.zeros((n, 8), np.int64),
-        # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
-        observations, np.empty(2 * observations.size + 1, np.uint64), 0,
-        over, 0, finals, results, np.empty(64, np.int64), heads, 0,
-        np.empty(n, np.uint32), np.empty(n, np.uint32),
-        np.empty(1_024, np.int32), np.zeros(1_024, np.int64), np.empty(64, np.int64),
-        np.empty(64, np.int64), np.zeros(1, DRAFT),
-    )  # fmt: skip
+    """A VectorState of these arrays, which it shares."""
+    n = display.observations.shape[0]
+    return VectorState(
+        rngs=rngs,
+        source=source,
+        config=config,
+        counters=counters,
+        episodes=episodes,
+        ahead=Ahead(
+            events=growing.events,
+            edges=growing.edges,
+            target=growing.target,
+            classes=growing.classes,
+        ),
+        display=Display(
+            observations=display.observations,
+            final_obs=display.final_obs,
+            shown=display.shown,
+            n_shown=growing.n_shown,
+        ),
+        outcome=Outcome(
+            done=outcome.done,
+            n_done=growing.n_done,
+            results=outcome.results,
+            report=growing.report,
+            heads=outcome.heads,
+            n_told=growing.n_told,
+        ),
+        room=Room(
+            pending=np.empty(n, np.uint32),
+            ended=np.empty(n, np.uint32),
+            channels=np.empty(1_024, np.int32),
+            offsets=np.zeros(1_024, np.int64),
+            onsets=np.empty(64, np.int64),
+            classes=np.empty(64, np.int64),
+            draft=np.zeros(1, DRAFT),
+        ),
+    )
+
+
+@compiled
+def growing_of(state: Any) -> Growing:
+    """What has grown in `state`, so that another can go on from there."""
+    ahead, display, outcome = state.ahead, state.display, state.outcome
+    return Growing(
+        ahead.events,
+        ahead.edges,
+        ahead.target,
+        ahead.classes,
+        outcome.report,
+        display.n_shown,
+        outcome.n_done,
+        outcome.n_told,
+    )
 
 
 @compiled
@@ -164,24 +324,25 @@ def store_events(
 
 
 @compiled
-def show(crowd: Any, n: int) -> int:
-    """Show the spikes of the present bin in the rows `looks[:n]`, which are clear.
+def show(state: Any, n: int) -> int:
+    """Show the spikes of the present bin in the rows `pending[:n]`, which are clear.
 
     Notes for each when to look again. Puts those that are at the end of what was drawn, or at their
-    deadline, into `ended`; returns their number. `looks` is used up.
+    deadline, into `ended`; returns their number. `pending` is used up.
 
     All rows show one spike, then those that have another show the next, and so on: no branch
     depends on how many spikes a bin has.
     """
-    bins, due, cursors, deadlines = crowd.clock[0], crowd.clock[1], crowd.clock[2], crowd.clock[3]
-    events, shift, looks, ended = crowd.events, crowd.shift, crowd.looks, crowd.ended
-    shown, n_shown, n_inputs = crowd.shown, crowd.n_shown, crowd.observations.shape[1]
+    bins, pending_bins, cursors, deadlines = state.counters
+    display, room = state.display, state.room
+    events, shift, pending, ended = state.ahead.events, state.config.shift, room.pending, room.ended
+    shown, n_shown, n_inputs = display.shown, display.n_shown, display.observations.shape[1]
     end = (1 << shift) - 1
     n_ended = 0
     while n > 0:
         n_more = 0
         for k in range(n):
-            i = looks[np.uint32(k)]
+            i = pending[np.uint32(k)]
             bin_ = np.int64(bins[i]) << shift
             cursor, deadline = cursors[i], deadlines[i]
             # Within the bin this is the channel; at the end of what was drawn `end`, in later bins
@@ -193,92 +354,95 @@ def show(crowd: Any, n: int) -> int:
             cursor = np.uint32(cursor + is_spike)
             cursors[i] = cursor
             channel = events[i, cursor] - bin_
-            due[i] = min((channel + bin_) >> shift, np.int64(deadline))
+            pending_bins[i] = min((channel + bin_) >> shift, np.int64(deadline))
             more = channel < end
-            looks[np.uint32(n_more)] = i
+            pending[np.uint32(n_more)] = i
             n_more += more
             ended[np.uint32(n_ended)] = i
             n_ended += (not more) & ((channel == end) | (bin_ >> shift == deadline))
         n = n_more
-    places = crowd.observations.reshape(-1)
-    for k in range(crowd.n_shown, n_shown):
+    places = display.observations.reshape(-1)
+    for k in range(display.n_shown, n_shown):
         places[shown[np.uint64(k)]] = 1
-    crowd.n_shown = n_shown
+    display.n_shown = n_shown
     return n_ended
 
 
 @compiled
-def show_due(crowd: Any) -> int:
+def show_pending(state: Any) -> int:
     """`show` for all rows that need a look in the present bin."""
-    bins, due, looks = crowd.clock[0], crowd.clock[1], crowd.looks
+    bins, pending_bins = state.counters.bin_, state.counters.pending_bin
+    pending = state.room.pending
     n = 0
-    for i in range(looks.size):
-        looks[n] = i
-        n += bins[i] == due[i]
-    return show(crowd, n)
+    for i in range(pending.size):
+        pending[n] = i
+        n += bins[i] == pending_bins[i]
+    return show(state, n)
 
 
 @compiled
-def show_first(crowd: Any, which: NDArray[Any]) -> None:
+def show_first(state: Any, which: NDArray[Any]) -> None:
     """Show the spikes of the bin at which each environment in `which` begins."""
+    pending = state.room.pending
     for k in range(which.size):
-        crowd.looks[k] = which[k]
-    show(crowd, which.size)
+        pending[k] = which[k]
+    show(state, which.size)
 
 
 @compiled
-def clear_all(crowd: Any) -> None:
+def clear_all(display: Any) -> None:
     """Clear all ones."""
-    places = crowd.observations.reshape(-1)
-    for place in crowd.shown[: crowd.n_shown]:
+    places = display.observations.reshape(-1)
+    for place in display.shown[: display.n_shown]:
         places[place] = 0
-    crowd.n_shown = 0
+    display.n_shown = 0
 
 
 @compiled
-def clear_rows(crowd: Any, which: NDArray[np.bool_]) -> int:
-    """Clear the rows `which`, and forget that their environments are over.
+def clear_rows(state: Any, which: NDArray[np.bool_]) -> int:
+    """Clear the rows `which`, and forget that their episodes are done.
 
-    Returns the number of environments that are still over.
+    Returns the number of environments whose episodes are still done.
     """
-    n_inputs = crowd.observations.shape[1]
+    display, outcome = state.display, state.outcome
+    n_inputs = display.observations.shape[1]
     n_shown = 0
-    for place in crowd.shown[: crowd.n_shown]:
+    for place in display.shown[: display.n_shown]:
         i = np.int64(place) // n_inputs
         if which[i]:
-            crowd.observations[i, np.int64(place) - i * n_inputs] = 0
+            display.observations[i, np.int64(place) - i * n_inputs] = 0
         else:
-            crowd.shown[n_shown] = place
+            display.shown[n_shown] = place
             n_shown += 1
-    crowd.n_shown = n_shown
-    n_over = 0
-    for i in crowd.over[: crowd.n_over]:
+    display.n_shown = n_shown
+    n_done = 0
+    for i in outcome.done[: outcome.n_done]:
         if not which[i]:
-            crowd.over[n_over] = i
-            n_over += 1
-    crowd.n_over = n_over
-    return n_over
+            outcome.done[n_done] = i
+            n_done += 1
+    outcome.n_done = n_done
+    return n_done
 
 
 @compiled
-def set_aside(crowd: Any) -> None:
-    """Move the observations of the environments that are over to `finals`."""
-    for k in range(crowd.n_over):
-        row = crowd.observations[crowd.over[k]]
+def set_aside(display: Any, done: NDArray[np.int64]) -> None:
+    """Move the observations of the environments `done` to `final_obs`."""
+    for k in range(done.size):
+        row = display.observations[done[k]]
         for channel in range(row.size):
-            crowd.finals[k, channel] = row[channel]
+            display.final_obs[k, channel] = row[channel]
             row[channel] = 0
 
 
 @compiled
-def first_bad_action(actions: NDArray[Any], most: float, over: NDArray[np.int64]) -> int:
-    """The first environment whose action is not in 0 … `most`, or −1; those `over` do not count."""
+def first_bad_action(actions: NDArray[Any], most: float, done: NDArray[np.int64]) -> int:
+    """The first environment whose action is not in 0 … `most`, or −1; those `done` do not count."""
     n_bad = 0
     for i in range(actions.size):
         n_bad += not 0 <= actions[i] <= most
     if n_bad > 0:
         for i in range(actions.size):
-            if not 0 <= actions[i] <= most and not np.any(over == i):
+            if not 0 <= actions[i] <= most and not np.any(done == i):
                 return i
     return -1
 
@@ -290,7 +454,7 @@ def fill_zero(array: NDArray[Any]) -> None:
 
 
 @compiled
-def is_used_up(crowd: Any, i: int) -> bool:
+def is_used_up(state: Any, i: int) -> bool:
     """Whether what was drawn for environment `i`, whose present bin is shown, ends here."""
-    left = crowd.events[i, crowd.clock[2, i]]
-    return left >> crowd.shift == crowd.clock[0, i]
+    left = state.ahead.events[i, state.counters.event[i]]
+    return left >> state.config.shift == state.counters.bin_[i]

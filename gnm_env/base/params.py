@@ -150,19 +150,23 @@ def from_keywords(kinds: tuple[type, ...], keywords: dict[str, Any]) -> list[Any
 
 def _unknown(name: str, known: list[str], task_names: list[str]) -> str:
     near = difflib.get_close_matches(str(name), known + task_names, n=1)
-    hint = f", did you mean {near[0]!r}?" if near else ";"
+    hint = f", did you mean {near[0]!r}?" if near else "."
     return (
         f"unknown keyword {name!r}{hint} The environment takes {', '.join(known)}, and the fields "
         f"of a Task: {', '.join(task_names)}"
     )
 
 
-def signature(*kinds: type, first: tuple[str, ...]) -> inspect.Signature:
+def signature(
+    *kinds: type, first: tuple[str, ...], without: tuple[str, ...] = ()
+) -> inspect.Signature:
     """The signature of a constructor that takes the fields of `kinds`, those in `first` by place.
 
-    For `help()` and for those who complete names; the constructor itself takes keywords.
+    Those in `without` are taken too, but only to say why they cannot be had. For `help()` and for
+    those who complete names; the constructor itself takes keywords.
     """
-    defaults = {f.name: f for kind in kinds for f in fields(kind) if f.name != "task_fields"}
+    hidden = ("task_fields", *without)
+    defaults = {f.name: f for kind in kinds for f in fields(kind) if f.name not in hidden}
     ordered = [*first, *(name for name in defaults if name not in first)]
     parameters = [
         inspect.Parameter(

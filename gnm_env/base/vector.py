@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import operator
+import threading
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,19 +16,26 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from gnm_env.base.env import checked_options
 from gnm_env.base.kernels import (
     COST,
     DISABLED,
     NEXT_STEP,
-    NO_LIMIT,
     SAME_STEP,
+    Config,
+    DisplayArrays,
+    Episodes,
+    Growing,
+    OutcomeArrays,
+    StepCounters,
     clear_rows,
     event_shift,
-    new_crowd,
+    growing_of,
+    new_state,
 )
-from gnm_env.checks import whole
+from gnm_env.base.params import NO_LIMIT, EnvParams, VectorParams
+from gnm_env.checks import MAX_SEED, require_memory, shown, whole
 from gnm_env.generators import Generators
-from gnm_env.task import Patterns, Task, task_arrays
 
 AUTORESET = {
     AutoresetMode.NEXT_STEP: NEXT_STEP,
@@ -64,83 +73,123 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     bool array that tells where it holds (one for all keys, read-only). Lists are in object arrays.
     """
 
-    _results: Any
-    """TrialResults or StreamResults of the last step."""
+    _source: Any
+    """Where trials and streams come from, for compiled code."""
+    _episodes: Episodes
+    """The state of each episode, for compiled code."""
 
     def __init__(
-        self,
-        num_envs: int,
-        task: Task,
-        patterns: Patterns | None,
-        pattern_seed: int,
-        action_space: spaces.Space[Any],
-        max_episode_steps: int | None,
-        autoreset_mode: AutoresetMode | str,
-        copy: bool,
-        render_mode: str | None,
+        self, params: EnvParams, vector: VectorParams, action_space: spaces.Space[Any]
     ) -> None:
-        self.num_envs = whole("num_envs", num_envs, low=1)
-        self.task = task
-        self.patterns = Patterns.draw(task, pattern_seed) if patterns is None else patterns
-        self._task_arrays = task_arrays(task, self.patterns)
-        if render_mode is not None:
+        if params.render_mode is not None:
             raise ValueError(
-                f"render_mode must be None, got {render_mode!r}: many environments at once draw no "
-                "pictures; use gymnasium.make or vectorization_mode='sync'"
+                f"render_mode must be None, got {params.render_mode!r}: many environments at once "
+                "draw no pictures; use gymnasium.make or vectorization_mode='sync'"
             )
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.num_envs, self.copy = vector.num_envs, vector.copy
+        self.task, self.patterns = params.task, params.patterns
+        self.autoreset_mode = AutoresetMode(vector.autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self._by_hand = self.autoreset_mode == AutoresetMode.DISABLED
-        self.copy = bool(copy)
-        self._limit = NO_LIMIT
-        if max_episode_steps is not None:
-            self._limit = whole("max_episode_steps", max_episode_steps, low=1, high=NO_LIMIT - 1)
-        self.single_observation_space = spaces.Box(0, 1, (task.n_inputs,), np.int8)
+        self._limit = vector.max_episode_steps or NO_LIMIT
+        self._n_inputs = params.n_inputs
+        self.single_observation_space = spaces.Box(0, 1, (self._n_inputs,), np.int8)
         self.single_action_space = action_space
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(action_space, self.num_envs)
-
-        self._observations = np.zeros((self.num_envs, task.n_inputs), np.int8)
-        self._finals = np.zeros_like(self._observations)
-        self._over = np.zeros(self.num_envs, np.int64)
-        self._heads = np.zeros((self.num_envs, 5), np.int64)
-        self._n_over = 0
+        n = self.num_envs
+        require_memory(
+            f"num_envs = {n:,} with {self._n_inputs:,} channels each",
+            20.0 * n * self._n_inputs,
+            "lower num_envs",
+        )
+        self.observation_space = batch_space(self.single_observation_space, n)
+        self.action_space = batch_space(action_space, n)
+        self._display = DisplayArrays(
+            observations=np.zeros((n, self._n_inputs), np.int8),
+            final_obs=np.zeros((n, self._n_inputs), np.int8),
+            # Under SAME_STEP a row may be shown twice in a step: its last bin, and the first anew.
+            shown=np.empty(2 * n * self._n_inputs + 1, np.uint64),
+        )
+        self._outcome = OutcomeArrays(
+            done=np.zeros(n, np.int64),
+            results=self._new_results(),
+            heads=np.zeros((n, 6), np.int64),
+        )
+        self._counters = StepCounters(*np.zeros((4, n), np.uint32))
+        self._n_done = 0
         self._generators: Generators | None = None
         self._seeds: list[int | None] = []
-        self._crowd: Any = None
+        self._state: Any = None
+        """Everything for compiled code, from the first `reset` on."""
+        self._entry = threading.Lock()
 
-    def _new_crowd(
-        self,
-        state: NDArray[Any],
-        emitted: NDArray[Any],
-        most: float,
-        feedback: int = COST,
-        tolerance: float = 0.0,
-    ) -> Any:
-        return new_crowd(
-            self._seeded().held,
-            self._task_arrays,
-            AUTORESET[self.autoreset_mode],
-            self._limit,
-            most,
-            feedback,
-            tolerance,
-            state,
-            emitted,
-            np.zeros((self.num_envs, 8), self._event_type()),
-            self._observations,
-            self._over,
-            self._finals,
-            self._results,
-            self._heads,
+    def _new_state(self, growing: Growing) -> Any:
+        """The environments for compiled code, going on from what has grown."""
+        return new_state(
+            rngs=self._seeded().held,
+            source=self._source,
+            config=self._config(),
+            counters=self._counters,
+            episodes=self._episodes,
+            display=self._display,
+            outcome=self._outcome,
+            growing=growing,
         )
+
+    def _config(self) -> Config:
+        """What never changes, for compiled code."""
+        return Config(
+            autoreset=AUTORESET[self.autoreset_mode],
+            limit=self._limit,
+            most=1.0,
+            feedback=COST,
+            tolerance=0.0,
+            shift=event_shift(self._n_inputs),
+        )
+
+    def _nothing_grown(self) -> Growing:
+        """Rows for what has not begun."""
+        n = self.num_envs
+        return Growing(
+            events=np.zeros((n, 8), self._event_type()),
+            edges=np.zeros((n, 18), np.int64),
+            target=np.zeros((n, 17), np.int64),
+            classes=np.zeros((n, 8), np.int64),
+            report=np.empty(64, np.int64),
+            n_shown=0,
+            n_done=0,
+            n_told=0,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy needs to go on from here."""
+        self._enter()
+        try:
+            kept = {name: value for name, value in self.__dict__.items() if name != "_entry"}
+            kept["_state"] = None if self._state is None else growing_of(self._state)
+            return kept
+        finally:
+            self._entry.release()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._entry = threading.Lock()
+        if self._state is not None:
+            self._state = self._new_state(self._state)
 
     def _event_type(self) -> type[np.signedinteger[Any]]:
         """The smallest type that holds the last bin of what is drawn, with a channel."""
-        bits = event_shift(self.task.n_inputs) + math.ceil(math.log2(self._most_bins() + 2))
+        bits = event_shift(self._n_inputs) + math.ceil(math.log2(self._most_bins() + 2))
         return np.int32 if bits < 32 else np.int64
 
     # What the two kinds of environment do each in its own way.
+
+    def _new_results(self) -> Any:
+        """TrialResults or StreamResults, of zeros."""
+        raise NotImplementedError
+
+    def _step(self, actions: NDArray[Any]) -> Step:
+        """One step; nobody else is in here."""
+        raise NotImplementedError
 
     def _most_bins(self) -> float:
         """No trial, or piece of a stream, is ever longer."""
@@ -178,38 +227,56 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             self._generators = Generators(rng for rng, _ in drawn)
         return self._generators
 
-    def _seed(self, seed: Seeds, which: NDArray[np.int64]) -> None:
+    def _seed(self, seeds: list[int | None] | None, which: NDArray[np.int64]) -> None:
         """New generators for the environments `which` that are given a seed."""
-        if seed is None:
+        if seeds is None:
             return
-        seeds = self._seed_of_each(seed)
-        # All first: a seed that is refused then leaves everything as it was.
-        drawn = {i: seeding.np_random(seeds[i]) for i in which.tolist() if seeds[i] is not None}
         generators = self._seeded()
-        for i, (rng, self._seeds[i]) in drawn.items():
-            generators.replace(i, rng)
-            self._reseeded(i)
+        for i in which.tolist():
+            if seeds[i] is not None:
+                rng, self._seeds[i] = seeding.np_random(seeds[i])
+                generators.replace(i, rng)
+                self._reseeded(i)
 
-    def _seed_of_each(self, seed: int | list[int | None]) -> list[int | None]:
-        """One seed per environment, None where its generator goes on."""
+    def _seed_of_each(self, seed: Any) -> list[int | None] | None:
+        """One seed per environment, None where its generator goes on; ValueError if they are none.
+
+        None if no generator is to be replaced.
+        """
+        if seed is None:
+            return None
+        n = self.num_envs
+        expected = f"seed must be a whole number or one per environment, num_envs = {n}"
         try:
-            first = operator.index(seed)  # type: ignore[arg-type]
+            first = operator.index(seed)
         except TypeError:
-            return self._listed(seed)
-        return [first + i for i in range(self.num_envs)]
+            return self._listed(seed, expected)
+        whole("seed", first, low=0, high=MAX_SEED - n)
+        return [first + i for i in range(n)]
 
-    def _listed(self, seeds: Any) -> list[int | None]:
+    def _listed(self, seeds: Any, expected: str) -> list[int | None]:
         """Seeds that are given one by one."""
-        expected = f"seed must be a whole number or one per environment, num_envs = {self.num_envs}"
+        if not isinstance(seeds, (Sequence, np.ndarray)) or isinstance(seeds, (str, bytes)):
+            raise ValueError(f"{expected}, got {shown(seeds)}")
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{expected}, got {len(seeds)} seeds")
         try:
-            listed = [None if seed is None else operator.index(seed) for seed in seeds]
+            return [
+                None if seed is None else whole(f"seed[{i}]", operator.index(seed), low=0)
+                for i, seed in enumerate(seeds)
+            ]
         except TypeError:
-            raise ValueError(f"{expected}, got {seeds!r}") from None
-        if len(listed) != self.num_envs:
-            raise ValueError(f"{expected}, got {len(listed)} seeds")
-        return listed
+            raise ValueError(f"{expected}, got {shown(seeds)}") from None
 
     # Reset and step
+
+    def _enter(self) -> None:
+        """RuntimeError if another thread is at work in these environments."""
+        if not self._entry.acquire(blocking=False):
+            raise RuntimeError(
+                "another thread is stepping, resetting or copying these environments: let one "
+                "thread do it, or give each thread environments of its own"
+            )
 
     def reset(
         self, *, seed: Seeds = None, options: dict[str, Any] | None = None
@@ -218,44 +285,57 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
         `seed` is that of environment 0, the others counting up, or a list; see the class.
         """
-        mask = self._mask(options)
-        which = np.flatnonzero(mask)
-        self._seed(seed, which)
-        if self._crowd is not None:
-            self._n_over = clear_rows(self._crowd, mask)
-        self._begin(which)
-        return self._seen(), {}
+        self._enter()
+        try:
+            mask = self._mask(options)
+            # All first: a seed that is refused then leaves everything as it was.
+            seeds = self._seed_of_each(seed)
+            which = np.flatnonzero(mask)
+            self._seed(seeds, which)
+            if self._state is None:
+                self._state = self._new_state(self._nothing_grown())
+            self._n_done = clear_rows(self._state, mask)
+            self._begin(which)
+            return self._seen(), {}
+        finally:
+            self._entry.release()
+
+    def step(self, actions: NDArray[Any]) -> Step:
+        """Answer the bin just seen in every environment: see the single environment, and above."""
+        self._enter()
+        try:
+            if self._state is None or (self._n_done and self._by_hand):
+                raise self._reset_needed()
+            return self._step(actions)
+        finally:
+            self._entry.release()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
         """Where to reset."""
-        unknown = sorted(set(options or {}) - {"reset_mask"})
-        if unknown:
-            raise ValueError(f"unknown reset option {unknown[0]!r}; known options: 'reset_mask'")
-        mask = (options or {}).get("reset_mask")
+        mask = checked_options(options, ("reset_mask",)).get("reset_mask")
         if mask is None:
             return np.ones(self.num_envs, np.bool_)
         wrong = not isinstance(mask, np.ndarray) or mask.dtype != np.bool_
         if wrong or mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(
                 f"options['reset_mask'] must be a bool array of shape ({self.num_envs},) with at "
-                f"least one True, got {mask!r}"
+                f"least one True, got {shown(mask)}"
             )
-        if self._crowd is None:
+        if self._state is None:
             raise ResetNeeded("call reset() once for all environments before using 'reset_mask'")
-        return mask
+        return np.ascontiguousarray(mask)
 
     def _seen(self) -> Bits:
-        return self._observations.copy() if self.copy else self._observations
+        return self._display.observations.copy() if self.copy else self._display.observations
 
-    def _require_reset(self) -> None:
-        """ResetNeeded unless every environment can take a step."""
-        if self._crowd is None:
-            raise ResetNeeded("call reset() before step()")
-        if self._n_over and self._by_hand:
-            raise ResetNeeded(
-                f"environment {self._over[0]} has ended and autoreset is disabled: call "
-                "reset(options={'reset_mask': mask}) before step()"
-            )
+    def _reset_needed(self) -> ResetNeeded:
+        """Why no step can be taken."""
+        if self._state is None:
+            return ResetNeeded("call reset() before step()")
+        return ResetNeeded(
+            f"environment {self._outcome.done[0]} has ended and autoreset is disabled: call "
+            "reset(options={'reset_mask': mask}) before step()"
+        )
 
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
         """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
@@ -275,7 +355,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def _stepped(self, info: dict[str, Any]) -> Step:
         """What `step` returns: copies, since the next step writes to the same results."""
-        results = self._results
+        results = self._outcome.results
         return (
             self._seen(),
             results.rewards.copy(),
@@ -288,12 +368,14 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         """`terminal`, the info of what has ended, in the form that the autoreset mode asks for."""
         if self.autoreset_mode != AutoresetMode.SAME_STEP:
             return terminal
-        over = self._over[: self._n_over]
+        done = self._outcome.done[: self._n_done]
         final_obs = np.empty(self.num_envs, object)
-        for i, row in zip(over.tolist(), self._finals[: self._n_over].copy(), strict=True):
+        for i, row in zip(
+            done.tolist(), self._display.final_obs[: self._n_done].copy(), strict=True
+        ):
             final_obs[i] = row
         mask = np.zeros(self.num_envs, np.bool_)
-        mask[over] = True
+        mask[done] = True
         return {
             "final_obs": final_obs,
             "_final_obs": mask,

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from gnm_env.base.kernels import Episodes
+from gnm_env.base.params import EnvParams, VectorParams, from_keywords, signature
 from gnm_env.base.vector import PatternVectorEnv, Step, read_only
 from gnm_env.rules import MISTAKES
 from gnm_env.sampling import PIECE_BINS
@@ -28,34 +29,28 @@ class PatternStreamVectorEnv(PatternVectorEnv):
     `info`.
     """
 
+    __signature__ = signature(
+        EnvParams, VectorParams, first=("num_envs", "task", "patterns"), without=("render_mode",)
+    )
+
     def __init__(
         self,
         num_envs: int = 1,
         task: Task | None = None,
         patterns: Patterns | None = None,
-        *,
-        pattern_seed: int = 0,
-        max_episode_steps: int | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        copy: bool = True,
-        render_mode: str | None = None,
-        **task_fields: Any,
+        **arguments: Any,
     ) -> None:
-        super().__init__(
-            num_envs,
-            Task.from_keywords(task, task_fields),
-            patterns,
-            pattern_seed,
-            spaces.Discrete(2),
-            max_episode_steps,
-            autoreset_mode,
-            copy,
-            render_mode,
-        )
+        given = {"num_envs": num_envs, "task": task, "patterns": patterns, **arguments}
+        params, vector = from_keywords((EnvParams, VectorParams), given)
+        super().__init__(params, vector, spaces.Discrete(2))
+        self._source = params.task_arrays
+        records = np.zeros(self.num_envs, STREAM_STATE)
+        records["anew"] = 1
+        self._episodes = Episodes(records=records, emitted=np.zeros(0, np.int64))
+
+    def _new_results(self) -> StreamResults:
         n = self.num_envs
-        self._state = np.zeros(n, STREAM_STATE)
-        self._state["anew"] = 1
-        self._results = StreamResults(
+        return StreamResults(
             rewards=np.zeros(n),
             terminated=np.zeros(n, np.bool_),
             truncated=np.zeros(n, np.bool_),
@@ -64,29 +59,23 @@ class PatternStreamVectorEnv(PatternVectorEnv):
         )
 
     def _most_bins(self) -> float:
-        return PIECE_BINS + self.task.pattern_bins
+        return PIECE_BINS + int(self._source.pattern_bins)
 
     def _reseeded(self, i: int) -> None:
-        self._state[i]["anew"] = 1
+        self._episodes.records[i]["anew"] = 1
 
     def _begin(self, which: NDArray[np.int64]) -> None:
-        if self._crowd is None:
-            self._crowd = self._new_crowd(self._state, np.zeros(0, np.int64), most=1.0)
-        begin_streams(self._crowd, which)
+        begin_streams(self._state, which)
 
-    def step(self, actions: NDArray[Any]) -> Step:
-        self._require_reset()
-        bad, self._n_over = step_streams(self._crowd, self._spikes(actions))
+    def _step(self, actions: NDArray[Any]) -> Step:
+        bad, self._n_done = step_streams(self._state, self._spikes(actions))
         if bad >= 0:
             raise self._no_spike(actions, bad)
-        info: dict[str, Any] = {}
-        if self._n_over:
-            info = self._info(self._terminal_info())
-        return self._stepped(info)
+        return self._stepped(self._info(self._terminal_info()) if self._n_done else {})
 
     def _terminal_info(self) -> dict[str, Any]:
         """The info of streams that a mistake has ended, from the results."""
-        results = self._results
+        results = self._outcome.results
         if not results.terminated.any():  # truncated only
             return {}
         mask = read_only(results.terminated)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gnm_env.trial import Trial
 
 
@@ -44,4 +47,16 @@ def info_of(trial: Trial, emitted: float) -> dict[str, Any]:
     info = told._asdict()
     if trial.label_only:
         info["label_only"] = True
+    return info
+
+
+def masked(
+    told: TerminalInfo, mask: NDArray[np.bool_], label_only: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """The terminal `info` of many environments, in those of `mask`, as Gymnasium has it."""
+    info: dict[str, Any] = {}
+    for key, value in zip(told._fields, told, strict=True):
+        info[key], info[f"_{key}"] = value, mask
+    if label_only.any():
+        info["label_only"], info["_label_only"] = label_only.copy(), label_only.copy()
     return info

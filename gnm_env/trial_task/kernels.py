@@ -1,4 +1,8 @@
-"""Compiled steps of many trials at once; `gnm_env.base.kernels` says how they are laid out."""
+"""Compiled steps of many trials at once; `gnm_env.base.kernels` says how they are laid out.
+
+Trials are drawn from a task or heard from a data set. `begin_…` and `step_…` are there once for
+each, as `drawn` and `recorded`.
+"""
 
 from __future__ import annotations
 
@@ -17,22 +21,27 @@ from gnm_env.base.kernels import (
     first_bad_action,
     is_used_up,
     set_aside,
-    show_due,
     show_first,
+    show_pending,
     store_events,
     widened,
 )
-from gnm_env.compiled import compiled
-from gnm_env.rules import compiled_reward_for
+from gnm_env.compiled import compiled, inlined, specialise
+from gnm_env.rules import compiled_dense_reward, compiled_reward_for
 from gnm_env.sampling import begin_trial, fill_trial, longer_buffers
-from gnm_env.task import TaskArrays
+from gnm_env.segments import compiled_segment_at
 
 TRIAL_STATE = np.dtype(
     [
         ("label", np.int64),
-        ("n_occurrences", np.int64),
-        ("occurrence", np.int64),  # the next occurrence to end, and the output in it so far
+        ("n_bins", np.int64),
+        ("n_presentations", np.int64),
+        ("pattern_bins", np.int64),  # bins of each presentation; 0 where they differ
+        ("label_only", np.int64),  # whether it is not known where the label was earned
+        ("segment", np.int64),  # the present segment, and the output in it so far
         ("given", np.float64),
+        ("n_heard", np.int64),  # trials of the present epoch, where they come from a data set
+        ("anew", np.int64),  # the generator is new, and so is the epoch
     ]
 )
 
@@ -46,196 +55,335 @@ class TrialResults(NamedTuple):
     labels: NDArray[np.int64]
     outputs: NDArray[Any]
     pattern_bins: NDArray[np.int64]
+    label_only: NDArray[np.bool_]
 
 
-@compiled
-def begin_trials(crowd: Any, which: NDArray[np.int64]) -> None:
-    """Draw a trial for each environment in `which` and show its first bin; their rows are clear."""
+class Recorded(NamedTuple):
+    """A data set as the source of trials."""
+
+    trials: Any
+    """TrialsArrays, shared by all environments."""
+    pattern_bins: int
+    """Bins of each presentation, told of trials that have none; 0 where they differ."""
+    orders: NDArray[np.uint32]
+    """(n, trials), the order of the trials in the present epoch of each environment."""
+
+
+def begin_trials(state: Any, which: NDArray[np.int64]) -> None:
+    """Begin a trial in each environment in `which` and show its first bin; their rows are clear."""
     n_begun = 0
     is_new = True
     while n_begun < which.size:
-        n_begun = _draw_trials(crowd, which, n_begun, is_new)
+        n_begun = fetch(state, which, n_begun, is_new)
         if n_begun < which.size:
             is_new = False
-            _make_room(crowd)
-    show_first(crowd, which)
+            make_room(state, which[n_begun])
+    show_first(state, which)
+
+
+def fetch(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
+    """Put trials for `which[first:]` into their rows, the first of them perhaps begun already.
+
+    Returns the place in `which` of the environment for which there was not enough room, or the
+    number of all. No array is exchanged for a longer one in here: numba counts references to those
+    that are.
+    """
+    raise NotImplementedError  # the two below take its place
+
+
+def make_room(state: Any, i: int) -> None:
+    """Room for the trial that environment `i` is about to hear."""
+    raise NotImplementedError  # the two below take its place
 
 
 @compiled
-def _draw_trials(crowd: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
-    """Draw trials for `which[first:]`, the first of them perhaps begun already (`is_new` False).
-
-    Returns the number of the environment for which there was not enough room, or that of all. No
-    array is exchanged for a longer one in here: numba counts references to those that are.
-    """
-    held, task, state, emitted = crowd.held, crowd.task, crowd.state, crowd.emitted
-    events, parts, shift, limit = crowd.events, crowd.parts, crowd.shift, crowd.limit
-    bins, cursors, deadlines = crowd.clock[0], crowd.clock[2], crowd.clock[3]
-    channels, offsets, onsets, classes = crowd.channels, crowd.offsets, crowd.onsets, crowd.classes
-    draft = crowd.draft
+def _draw_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
+    """`fetch` of trials that are drawn."""
+    rngs, task, shift = state.rngs, state.source, state.config.shift
+    ahead, room, counters = state.ahead, state.room, state.counters
+    events, classes_ahead = ahead.events, ahead.classes
+    channels, offsets, onsets, classes = room.channels, room.offsets, room.onsets, room.classes
+    draft = room.draft
     n = first
     fits = True
     while fits and n < which.size:
         i = which[n]
         if is_new:
             begin_trial(draft, offsets, 0, 0)
-        fits = fill_trial(held[i], task, channels, offsets, onsets, classes, draft)
-        n_bins, n_occurrences = draft[0].bin_, draft[0].occurrence
-        fits = fits and offsets[n_bins] < events.shape[1] and n_occurrences <= parts.shape[1]
+        fits = fill_trial(rngs[i], task, channels, offsets, onsets, classes, draft)
+        n_bins, n_presentations = draft[0].bin_, draft[0].occurrence
+        fits = fits and offsets[n_bins] < events.shape[1]
+        fits = fits and n_presentations <= classes_ahead.shape[1]
         if fits:
             store_events(events, i, shift, n_bins, channels, offsets)
-            for k in range(n_occurrences):
-                parts[i, k] = (onsets[k] << 32) + classes[k]
-            s = state[i]
-            s.n_occurrences, s.label = n_occurrences, draft[0].label
-            s.occurrence, s.given = 0, 0.0
-            emitted[i] = 0
-            bins[i], cursors[i], deadlines[i] = 0, 0, limit
+            _store_segments(ahead, i, n_presentations, n_bins, onsets, classes, task)
+            _begin(state.episodes, counters, i, state.config.limit)
+            s = state.episodes.records[i]
+            s.label, s.n_bins, s.n_presentations = draft[0].label, n_bins, n_presentations
+            s.pattern_bins = task.pattern_bins
             n += 1
             is_new = True
     return n
 
 
+@inlined
+def _store_segments(
+    ahead: Any,
+    i: int,
+    n: int,
+    n_bins: int,
+    onsets: NDArray[np.int64],
+    classes: NDArray[np.int64],
+    task: Any,
+) -> None:
+    """Put the segments of a trial with `n` presentations of the task's patterns into row `i`."""
+    edges, target = ahead.edges[i], ahead.target[i]
+    edges[0], target[0] = 0, 0
+    for k in range(n):
+        class_ = classes[k]
+        ahead.classes[i, k] = class_
+        edges[2 * k + 1] = onsets[k]
+        edges[2 * k + 2] = onsets[k] + task.pattern_bins
+        target[2 * k + 1] = task.targets[class_]
+        target[2 * k + 2] = 0
+    edges[2 * n + 1] = n_bins
+
+
 @compiled
-def _make_room(crowd: Any) -> None:
-    """Room for what is drawn, or for the one trial that is drawn, where there was too little."""
-    draft, offsets = crowd.draft[0], crowd.offsets
-    crowd.channels, crowd.offsets, crowd.onsets, crowd.classes = longer_buffers(
-        crowd.task, crowd.channels, offsets, crowd.onsets, crowd.classes, crowd.draft
+def _draw_room(state: Any, i: int) -> None:
+    """`make_room` for what is drawn, or for the one trial that is drawn."""
+    room, ahead = state.room, state.ahead
+    room.channels, room.offsets, room.onsets, room.classes = longer_buffers(
+        state.source, room.channels, room.offsets, room.onsets, room.classes, room.draft
     )
-    crowd.events = widened(crowd.events, draft.n_events + 1)
-    crowd.parts = widened(crowd.parts, draft.occurrence)
+    draft = room.draft[0]
+    _widen(ahead, draft.n_events, draft.occurrence)
 
 
 @compiled
-def step_trials(
-    crowd: Any,
-    actions: NDArray[Any],
-) -> tuple[int, int, int, bool]:
+def _widen(ahead: Any, n_events: int, n_presentations: int) -> None:
+    """Rows that hold so many events and presentations, and the ends behind them."""
+    ahead.events = widened(ahead.events, n_events + 1)
+    ahead.classes = widened(ahead.classes, n_presentations)
+    ahead.edges = widened(ahead.edges, 2 * ahead.classes.shape[1] + 2)
+    ahead.target = widened(ahead.target, 2 * ahead.classes.shape[1] + 1)
+
+
+@inlined
+def _begin(episodes: Any, counters: Any, i: int, limit: int) -> None:
+    """Nothing heard and nothing given yet."""
+    s = episodes.records[i]
+    s.segment, s.given = 0, 0.0
+    episodes.emitted[i] = 0
+    counters.bin_[i], counters.event[i], counters.deadline[i] = 0, 0, limit
+
+
+@compiled
+def _hear_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
+    """`fetch` of the trials that come next in the data set's order."""
+    ahead = state.ahead
+    n = first
+    while n < which.size:
+        i = which[n]
+        number = _next_number(state, i)
+        n_events, n_presentations = _sizes(state.source.trials, number)
+        if n_events >= ahead.events.shape[1] or n_presentations > ahead.classes.shape[1]:
+            return n
+        _copy_trial(state, i, number)
+        _begin(state.episodes, state.counters, i, state.config.limit)
+        state.episodes.records[i].n_heard += 1
+        n += 1
+    return n
+
+
+@compiled
+def _next_number(state: Any, i: int) -> int:
+    """Number of the trial that environment `i` hears next; draws an order where an epoch begins."""
+    s, order = state.episodes.records[i], state.source.orders[i]
+    if s.anew or s.n_heard == order.size:
+        drawn = state.rngs[i].permutation(order.size)
+        for k in range(order.size):
+            order[k] = drawn[k]
+        s.n_heard, s.anew = 0, 0
+    return int(order[s.n_heard])
+
+
+@compiled
+def _sizes(trials: Any, number: int) -> tuple[int, int]:
+    """Spikes and presentations of a trial in a data set."""
+    n_events = trials.first_spike[number + 1] - trials.first_spike[number]
+    return n_events, (trials.first_edge[number + 1] - trials.first_edge[number] - 2) // 2
+
+
+@compiled
+def _copy_trial(state: Any, i: int, number: int) -> None:
+    """Put a trial of the data set into row `i`; there is room."""
+    trials, ahead, shift = state.source.trials, state.ahead, state.config.shift
+    n_events, n = _sizes(trials, number)
+    first, edge = trials.first_spike[number], trials.first_edge[number]
+    for e in range(n_events):
+        ahead.events[i, e] = (np.int64(trials.bins[first + e]) << shift) + trials.channels[
+            first + e
+        ]
+    label = 0
+    for k in range(2 * n + 1):
+        ahead.edges[i, k] = trials.edges[edge + k]
+        ahead.target[i, k] = trials.target[edge + k]
+        label += trials.target[edge + k]
+    n_bins = trials.edges[edge + 2 * n + 1]
+    ahead.edges[i, 2 * n + 1] = n_bins
+    ahead.events[i, n_events] = ((n_bins + 1) << shift) - 1
+    pattern_bins = state.source.pattern_bins if n == 0 else ahead.edges[i, 2] - ahead.edges[i, 1]
+    for k in range(n):
+        # Two edges of each trial before belong to no presentation.
+        ahead.classes[i, k] = trials.classes[edge // 2 - number + k]
+        if ahead.edges[i, 2 * k + 2] - ahead.edges[i, 2 * k + 1] != pattern_bins:
+            pattern_bins = 0
+    s = state.episodes.records[i]
+    s.label, s.n_bins, s.n_presentations, s.pattern_bins = label, n_bins, n, pattern_bins
+    s.label_only = trials.label_only[number]
+
+
+@compiled
+def _hear_room(state: Any, i: int) -> None:
+    """`make_room` for the next trial of the data set."""
+    number = _next_number(state, i)
+    n_events, n_presentations = _sizes(state.source.trials, number)
+    _widen(state.ahead, n_events, n_presentations)
+
+
+begin_drawn = specialise(begin_trials, "drawn", fetch=_draw_trials, make_room=_draw_room)
+begin_recorded = specialise(begin_trials, "recorded", fetch=_hear_trials, make_room=_hear_room)
+
+
+def step_trials(state: Any, actions: NDArray[Any]) -> tuple[int, int, int, bool]:
     """One step of every environment: writes the `results` and, of trials that ended, the `report`.
 
     Returns the number of the first environment with a bad action (−1: none; else nothing has been
-    done), the number of environments now over, the number of trials that ended, and whether the
+    changed), the number of environments now done, the number of trials that ended, and whether the
     report is a new array, since the old one was too short.
     """
-    bad = first_bad_action(actions, crowd.most, crowd.over[: crowd.n_over])
+    outcome, config, counters = state.outcome, state.config, state.counters
+    done = outcome.done
+    bad = first_bad_action(actions, config.most, done[: outcome.n_done])
     if bad >= 0:
-        return bad, crowd.n_over, 0, False
-    _forget(crowd)
-    clear_all(crowd)
-    over, emitted, rewards = crowd.over, crowd.emitted, crowd.results.rewards
-    bins = crowd.clock[0]
-    if crowd.feedback == DENSE:
-        for i in range(actions.size):
-            rewards[i] = _dense_reward(
-                crowd.state[i], bins[i], actions[i], crowd.task, crowd.parts[i], crowd.tolerance
-            )
-        for i in over[: crowd.n_over]:
-            rewards[i] = 0.0
+        return bad, outcome.n_done, 0, False
+    _forget(outcome)
+    clear_all(state.display)
+    if config.feedback == DENSE:
+        _reward_densely(state, actions)
+    bins, emitted = counters.bin_, state.episodes.emitted
     for i in range(actions.size):
         bins[i] += 1
         emitted[i] += actions[i]
-    if crowd.autoreset == NEXT_STEP:
-        begin_trials(crowd, over[: crowd.n_over])
+    if config.autoreset == NEXT_STEP:
+        begin_trials(state, done[: outcome.n_done])
 
-    n_over = show_due(crowd)
-    for k in range(n_over):
-        over[k] = crowd.ended[k]
-    crowd.n_over = n_over
-    is_new = _tell(crowd)
-    if crowd.autoreset == SAME_STEP:
-        set_aside(crowd)
-        begin_trials(crowd, over[:n_over])
-        crowd.n_over = 0
-    return -1, n_over, crowd.n_told, is_new
+    n_done = show_pending(state)
+    ended = state.room.ended
+    for k in range(n_done):
+        done[k] = ended[k]
+    outcome.n_done = n_done
+    is_new = _tell(state)
+    if config.autoreset == SAME_STEP:
+        set_aside(state.display, done[:n_done])
+        begin_trials(state, done[:n_done])
+        outcome.n_done = 0
+    return -1, n_done, outcome.n_told, is_new
 
 
 @compiled
-def _forget(crowd: Any) -> None:
+def _forget(outcome: Any) -> None:
     """Clear the results of the trials that the last step ended."""
-    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
-    for k in range(crowd.n_told):
-        i = crowd.heads[k, 0]
-        rewards[i], terminated[i], labels[i], outputs[i], pattern_bins[i] = 0.0, False, 0, 0, 0
-    fill_zero(truncated)
+    results, heads = outcome.results, outcome.heads
+    for k in range(outcome.n_told):
+        i = heads[k, 0]
+        results.rewards[i], results.terminated[i], results.labels[i] = 0.0, False, 0
+        results.outputs[i], results.pattern_bins[i], results.label_only[i] = 0, 0, False
+    fill_zero(results.truncated)
 
 
 @compiled
-def _tell(crowd: Any) -> bool:
-    """Write results and report of the environments that are over; whether the report is new."""
-    rewards, terminated, truncated, labels, outputs, pattern_bins = crowd.results
-    report, room, heads = crowd.report, crowd.report.size, crowd.heads
-    bins, deadlines = crowd.clock[0], crowd.clock[3]
+def _tell(state: Any) -> bool:
+    """Write results and report of the environments that are done; whether the report is new."""
+    outcome, config, ahead, counters = state.outcome, state.config, state.ahead, state.counters
+    results, heads, report = outcome.results, outcome.heads, outcome.report
+    room = report.size
     n_told = end = 0
-    for i in crowd.over[: crowd.n_over]:
-        truncated[i] = bins[i] == deadlines[i]
-        if is_used_up(crowd, i):
-            s, output = crowd.state[i], crowd.emitted[i]
-            terminated[i] = True
-            labels[i], outputs[i], pattern_bins[i] = s.label, output, crowd.task.pattern_bins
-            if crowd.feedback != DENSE:
-                rewards[i] = compiled_reward_for(
-                    s.label - output, crowd.tolerance, crowd.feedback == SIGN
+    for i in outcome.done[: outcome.n_done]:
+        results.truncated[i] = counters.bin_[i] == counters.deadline[i]
+        if is_used_up(state, i):
+            s, output = state.episodes.records[i], state.episodes.emitted[i]
+            results.terminated[i] = True
+            results.labels[i], results.outputs[i] = s.label, output
+            results.pattern_bins[i], results.label_only[i] = s.pattern_bins, s.label_only != 0
+            if config.feedback != DENSE:
+                results.rewards[i] = compiled_reward_for(
+                    s.label - output, config.tolerance, config.feedback == SIGN
                 )
-            report = _reported(
-                report, heads[n_told], end, i, crowd.parts[i, : s.n_occurrences],
-                crowd.task.targets,
-            )  # fmt: skip
-            end = heads[n_told, 4]
+            n = s.n_presentations
+            if end + 4 * n > report.size:
+                report = _longer(report, end, end + 4 * n)
+            _report(report, heads[n_told], end, i, ahead.edges[i], ahead.target[i],
+                    ahead.classes[i, :n])  # fmt: skip
+            end += 4 * n
             n_told += 1
-    crowd.n_told, crowd.report = n_told, report
+    outcome.n_told, outcome.report = n_told, report
     return report.size > room
 
 
 @compiled
-def report_of(crowd: Any) -> NDArray[np.int64]:
-    """The report of the trials that the last step ended."""
-    return crowd.report
+def _reward_densely(state: Any, actions: NDArray[Any]) -> None:
+    """Dense feedback for the answers to the present bins; 0 for those who are done."""
+    outcome, ahead, tolerance = state.outcome, state.ahead, state.config.tolerance
+    bins, rewards = state.counters.bin_, outcome.results.rewards
+    for i in range(actions.size):
+        s = state.episodes.records[i]
+        rewards[i] = 0.0
+        if bins[i] < s.n_bins:
+            edges, bin_ = ahead.edges[i], np.int64(bins[i])
+            segment = compiled_segment_at(edges, s.segment, bin_)
+            if segment != s.segment:
+                s.segment, s.given = segment, 0.0
+            s.given += actions[i]
+            rewards[i] = compiled_dense_reward(
+                actions[i], s.given, ahead.target[i, segment], segment % 2 == 0,
+                bin_ + 1 == edges[segment + 1], tolerance,
+            )  # fmt: skip
+    for i in outcome.done[: outcome.n_done]:
+        rewards[i] = 0.0
 
 
 @compiled
-def _dense_reward(
-    s: Any,
-    bin_: int,
-    action: float,
-    task: TaskArrays,
-    occurrences: NDArray[np.int64],
-    tolerance: float,
-) -> float:
-    """−1 per output in noise, −|target − output| at the end of an occurrence."""
-    if s.occurrence == s.n_occurrences or bin_ < occurrences[s.occurrence] >> 32:
-        return 0.0 - action
-    s.given += action
-    if bin_ + 1 < (occurrences[s.occurrence] >> 32) + task.pattern_bins:
-        return 0.0
-    error = task.targets[occurrences[s.occurrence] & 0xFFFFFFFF] - s.given
-    s.occurrence += 1
-    s.given = 0.0
-    return float(compiled_reward_for(error, tolerance, False))
+def _longer(report: NDArray[np.int64], used: int, needed: int) -> NDArray[np.int64]:
+    longer = np.empty(2 * needed, np.int64)
+    for j in range(used):
+        longer[j] = report[j]
+    return longer
 
 
 @compiled
-def _reported(
+def _report(
     report: NDArray[np.int64],
     head: NDArray[np.int64],
     first: int,
     i: int,
-    occurrences: NDArray[np.int64],
-    targets: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """The report with the occurrences of environment `i` from `first` on; `head` says where."""
-    n = occurrences.size
-    if first + 3 * n > report.size:
-        longer = np.empty(2 * (first + 3 * n), np.int64)
-        for j in range(first):
-            longer[j] = report[j]
-        report = longer
+    edges: NDArray[np.int64],
+    target: NDArray[np.int64],
+    classes: NDArray[np.int64],
+) -> None:
+    """Report the presentations of environment `i` from `first` on; `head` says where."""
+    n = classes.size
     for k in range(n):
-        class_ = occurrences[k] & 0xFFFFFFFF
-        report[first + k] = occurrences[k] >> 32
-        report[first + n + k] = class_
-        report[first + 2 * n + k] = targets[class_]
+        report[first + k] = edges[2 * k + 1]
+        report[first + n + k] = classes[k]
+        report[first + 2 * n + k] = target[2 * k + 1]
+        report[first + 3 * n + k] = edges[2 * k + 2]
     head[0] = i
-    for part in range(4):
+    for part in range(5):
         head[1 + part] = first + part * n
-    return report
+
+
+# Last, since a specialised function knows only what stands above it.
+step_drawn = specialise(step_trials, "drawn", begin_trials=begin_drawn)
+step_recorded = specialise(step_trials, "recorded", begin_trials=begin_recorded)

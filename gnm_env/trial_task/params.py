@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium import spaces
 
 from gnm_env.base.params import EnvParams
 from gnm_env.checks import choice, real
-
-if TYPE_CHECKING:
-    from gnm_env.trials import Trials
+from gnm_env.trials import Trials
 
 FEEDBACK = ("cost", "sign", "dense")
 OUTPUT = ("spikes", "graded")
@@ -47,8 +45,6 @@ class TrialEnvParams(EnvParams):
         if self.trials is None:
             super()._resolve()
             return
-        from gnm_env.trials import Trials
-
         beside = [name for name in ("task", "patterns") if getattr(self, name) is not None]
         beside += list(self.task_fields)
         if self.pattern_seed != 0:
@@ -63,7 +59,7 @@ class TrialEnvParams(EnvParams):
                 f"trials must be gnm_env.Trials, got {type(self.trials).__name__}; "
                 "use Trials([trial, …])"
             )
-        if self.feedback == "dense" and any(trial.label_only for trial in self.trials):
+        if self.feedback == "dense" and self.trials.arrays.label_only.any():
             require_presentations("trials")
 
     @property

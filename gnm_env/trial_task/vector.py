@@ -6,23 +6,25 @@ import math
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from gnm_env.base.kernels import COST, DENSE, SIGN
+from gnm_env.base.kernels import COST, DENSE, SIGN, Config, Episodes, Growing, growing_of
+from gnm_env.base.params import VectorParams, from_keywords, signature
 from gnm_env.base.vector import PatternVectorEnv, Step, read_only
-from gnm_env.checks import choice, real
+from gnm_env.checks import require_memory
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
+from gnm_env.trial_task.info import TerminalInfo, masked
 from gnm_env.trial_task.kernels import (
     TRIAL_STATE,
+    Recorded,
     TrialResults,
-    begin_trials,
-    report_of,
-    step_trials,
+    begin_drawn,
+    begin_recorded,
+    step_drawn,
+    step_recorded,
 )
-from gnm_env.trial_task.params import FEEDBACK, OUTPUT
+from gnm_env.trial_task.params import TrialEnvParams
 
 FEEDBACK_NUMBER = {"cost": COST, "sign": SIGN, "dense": DENSE}
 
@@ -35,83 +37,112 @@ class PatternTrialVectorEnv(PatternVectorEnv):
     `PatternVectorEnv` for seeding, autoreset, observations and `info`.
     """
 
+    __signature__ = signature(
+        TrialEnvParams,
+        VectorParams,
+        first=("num_envs", "task", "patterns", "feedback"),
+        without=("render_mode",),
+    )
+
     def __init__(
         self,
         num_envs: int = 1,
         task: Task | None = None,
         patterns: Patterns | None = None,
         feedback: str = "cost",
-        *,
-        pattern_seed: int = 0,
-        output: str = "spikes",
-        max_output: float = 100.0,
-        tolerance: float = 0.0,
-        max_episode_steps: int | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        copy: bool = True,
-        render_mode: str | None = None,
-        **task_fields: Any,
+        **arguments: Any,
     ) -> None:
-        self.feedback = choice("feedback", feedback, FEEDBACK)
-        self.output = choice("output", output, OUTPUT)
-        self.max_output = real("max_output", max_output, above=0.0)
-        self.tolerance = real("tolerance", tolerance, low=0.0)
-        self._graded = self.output == "graded"
-        amounts = spaces.Box(0.0, self.max_output, (1,), np.float64)
-        super().__init__(
-            num_envs,
-            Task.from_keywords(task, task_fields),
-            patterns,
-            pattern_seed,
-            amounts if self._graded else spaces.Discrete(2),
-            max_episode_steps,
-            autoreset_mode,
-            copy,
-            render_mode,
+        whole_task = {"task": task, "patterns": patterns}
+        given = {"num_envs": num_envs, "feedback": feedback, **whole_task, **arguments}
+        params, vector = from_keywords((TrialEnvParams, VectorParams), given)
+        self._graded = params.graded
+        super().__init__(params, vector, params.action_space)
+        self.trials = params.trials
+        self.feedback, self.output = params.feedback, params.output
+        self.max_output, self.tolerance = params.max_output, params.tolerance
+        n = self.num_envs
+        records = np.zeros(n, TRIAL_STATE)
+        records["anew"] = 1
+        self._episodes = Episodes(records=records, emitted=np.zeros(n, self._amount_type()))
+        self._source = params.task_arrays if self.trials is None else self._recorded()
+        self._report = np.zeros(0, np.int64)
+        self._lists = ReusedRows(4, n)
+
+    def _recorded(self) -> Recorded:
+        """The data set as the source of trials; its arrays are shared, not copied."""
+        assert self.trials is not None
+        n_trials = len(self.trials)
+        require_memory(
+            f"the order of {n_trials:,} trials for each of {self.num_envs:,} environments",
+            4.0 * self.num_envs * n_trials,
+            "lower num_envs",
         )
-        n, amount = self.num_envs, np.float64 if self._graded else np.int64
-        self._emitted = np.zeros(n, amount)
-        self._results = TrialResults(
+        return Recorded(
+            trials=self.trials.arrays,
+            pattern_bins=self.trials.pattern_bins or 0,
+            orders=np.zeros((self.num_envs, n_trials), np.uint32),
+        )
+
+    def _amount_type(self) -> type[np.generic]:
+        return np.float64 if self._graded else np.int64
+
+    def _new_results(self) -> TrialResults:
+        n = self.num_envs
+        return TrialResults(
             rewards=np.zeros(n),
             terminated=np.zeros(n, np.bool_),
             truncated=np.zeros(n, np.bool_),
             labels=np.zeros(n, np.int64),
-            outputs=np.zeros(n, amount),
+            outputs=np.zeros(n, self._amount_type()),
             pattern_bins=np.zeros(n, np.int64),
+            label_only=np.zeros(n, np.bool_),
         )
-        self._report = np.zeros(0, np.int64)
-        self._lists = ReusedRows(3, n)
 
     def _most_bins(self) -> float:
+        if self.trials is not None:
+            return float(self.trials.n_bins.max())
         # A Poisson number exceeds this with a probability below 1e-80.
+        assert self.task is not None
         mean = self.task.n_classes * self.task.mean_occurrences
-        most_occurrences = mean + 20.0 * math.sqrt(mean) + 60.0
-        return self.task.background_bins + self.task.pattern_bins * most_occurrences
+        most_presentations = mean + 20.0 * math.sqrt(mean) + 60.0
+        return self.task.background_bins + self.task.pattern_bins * most_presentations
+
+    def _config(self) -> Config:
+        return (
+            super()
+            ._config()
+            ._replace(
+                most=self.max_output if self._graded else 1.0,
+                feedback=FEEDBACK_NUMBER[self.feedback],
+                tolerance=self.tolerance,
+            )
+        )
+
+    def _new_state(self, growing: Growing) -> Any:
+        state = super()._new_state(growing)
+        self._report = growing_of(state).report
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if state["trials"] is not None:  # one data set, not two equal ones
+            state["_source"] = state["_source"]._replace(trials=state["trials"].arrays)
+        super().__setstate__(state)
+
+    def _reseeded(self, i: int) -> None:
+        self._episodes.records[i]["anew"] = 1
 
     def _begin(self, which: NDArray[np.int64]) -> None:
-        if self._crowd is None:
-            self._crowd = self._new_crowd(
-                np.zeros(self.num_envs, TRIAL_STATE),
-                self._emitted,
-                self.max_output if self._graded else 1.0,
-                FEEDBACK_NUMBER[self.feedback],
-                self.tolerance,
-            )
-            self._report = report_of(self._crowd)
-        begin_trials(self._crowd, which)
+        (begin_drawn if self.trials is None else begin_recorded)(self._state, which)
 
-    def step(self, actions: NDArray[Any]) -> Step:
-        self._require_reset()
+    def _step(self, actions: NDArray[Any]) -> Step:
         answers = self._amounts(actions) if self._graded else self._spikes(actions)
-        bad, self._n_over, n_told, is_new = step_trials(self._crowd, answers)
+        step = step_drawn if self.trials is None else step_recorded
+        bad, self._n_done, n_told, is_new = step(self._state, answers)
         if bad >= 0:
             raise self._no_amount(actions, bad) if self._graded else self._no_spike(actions, bad)
         if is_new:
-            self._report = report_of(self._crowd)
-        info: dict[str, Any] = {}
-        if self._n_over:
-            info = self._info(self._terminal_info(n_told))
-        return self._stepped(info)
+            self._report = growing_of(self._state).report
+        return self._stepped(self._info(self._terminal_info(n_told)) if self._n_done else {})
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
@@ -133,26 +164,23 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         """The info of `n_told` trials at their end, from the results and the report."""
         if n_told == 0:  # truncated only
             return {}
-        heads = self._heads[:n_told].tolist()
+        heads = self._outcome.heads[:n_told].tolist()
         numbers = self._report[: heads[-1][-1]].tolist()
-        onsets, classes, targets = self._lists.rows([head[0] for head in heads])
-        for i, first, second, third, end in heads:
+        onsets, classes, targets, ends = self._lists.rows([head[0] for head in heads])
+        for i, first, second, third, fourth, end in heads:
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
-            targets[i] = numbers[third:end]
-        onsets, classes, targets = self._lists.lent()
-        results, mask = self._results, read_only(self._results.terminated)
-        return {
-            "label": results.labels.copy(),
-            "_label": mask,
-            "emitted": results.outputs.copy(),
-            "_emitted": mask,
-            "onsets": onsets,
-            "_onsets": mask,
-            "classes": classes,
-            "_classes": mask,
-            "targets": targets,
-            "_targets": mask,
-            "pattern_bins": results.pattern_bins.copy(),
-            "_pattern_bins": mask,
-        }
+            targets[i] = numbers[third:fourth]
+            ends[i] = numbers[fourth:end]
+        onsets, classes, targets, ends = self._lists.lent()
+        results = self._outcome.results
+        told = TerminalInfo(
+            label=results.labels.copy(),
+            emitted=results.outputs.copy(),
+            onsets=onsets,
+            classes=classes,
+            targets=targets,
+            ends=ends,
+            pattern_bins=results.pattern_bins.copy(),
+        )
+        return masked(told, read_only(results.terminated), results.label_only)

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import itertools
 import os
+import signal
+import threading
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Hashable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
 from agents.history import BLOCK, Callback, History
-from agents.lane_group import LaneGroup
-from agents.loop import warn_of_overflow
 from agents.memory import require_memory
-from agents.neuron_lanes import LANES_PER_BLOCK
+from agents.model import Model
+from agents.training.batch import AgentBatch
+from agents.training.loop import warn_of_overflow
+from agents.training.source import Source, source_of
 from gnm_env.checks import whole
 from gnm_env.task import Patterns, Task
 
@@ -28,12 +32,18 @@ With several, a thread that the machine holds up leaves work to the others. Ever
 trials for itself, which eight blocks make cheap.
 """
 
+MAX_TRIALS = 10**12
+"""Most trials of one call."""
+
+Unit = tuple[AgentBatch, list[int]]
+"""Agents that one thread trains side by side, and their places in the user's list."""
+
 
 def train_many(
     agents: Sequence[Any],
-    task: Task,
-    patterns: Patterns,
-    trials: int,
+    task: Task | Any,
+    patterns: Patterns | None = None,
+    trials: int | None = None,
     seed: int | Generator | None = None,
     threads: int | None = None,
     *,
@@ -45,14 +55,16 @@ def train_many(
     Each trial is drawn once for all agents of a kind that share a thread, from the same generator.
 
     Each agent ends with the bits that `train` gives it alone on the same seed, whatever the number
-    of agents and of threads.
+    of agents and of threads. An interrupt (Ctrl-C) waits for the present block of trials: all
+    agents then stand at the same trial, the last one of the history that the callback was given.
 
     Args:
-        agents: of any kinds that learn; those alike are trained side by side.
-        task, patterns: what they hear.
+        agents: of any kinds that learn, each once; those alike are trained side by side.
+        task, patterns: what they hear; or a data set of trials, `gnm_env.Trials`, in place of both.
         trials: number of trials.
         seed: of the stream. A Generator goes on from where it stands, and is moved on; None: a
-            stream that nobody has heard before.
+            stream that nobody has heard before. Of a data set, it draws the order of the trials,
+            each epoch anew.
         threads: number of threads; None: one per core.
         callback: called after each block with the trials done and the history; False ends training.
             The agents are up to date when it is called; what it changes in them is lost.
@@ -65,10 +77,15 @@ def train_many(
         ValueError: if there are no agents, if one cannot learn or does not fit the task, or if
             memory is short.
     """
-    trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
-    rng = seed if isinstance(seed, Generator) else np.random.default_rng(seed)
+    if trials is None:
+        raise ValueError("trials must say how many trials to train on, such as trials=60_000")
+    trials = whole("trials", trials, low=0, high=MAX_TRIALS)
+    block = whole("block", block, low=1, high=MAX_TRIALS)
+    rng = generator_from(seed)
     threads = thread_count(threads)
-    units = lane_groups(agents, task, patterns, threads)
+    source = source_of(task, patterns)
+    _refuse_twice(agents)
+    units = lane_groups(agents, source, threads)
     for group, places in units:
         if not hasattr(group, "train"):
             raise ValueError(
@@ -80,51 +97,89 @@ def train_many(
         mean_error=np.empty((0, len(agents))),
         overflowed=np.full(len(agents), -1),
     )
-    try:
-        with ThreadPoolExecutor(threads) as pool:
-            for start in range(0, trials, block):
-                size = min(block, trials - start)
-                _train_block(units, pool, rng, size, history)
-                if callback is not None:
-                    _write_back(units)
-                    if callback(start + size, history) is False:
-                        break
-                if np.all(history.overflowed >= 0):
-                    break
-    finally:
-        # After an interrupt too, and then only once every thread has finished its block: before
-        # that, weights are on the move.
-        _write_back(units)
+    if trials == 0:
+        return history
+    with ThreadPoolExecutor(threads) as pool:
+        for start in range(0, trials, block):
+            size = min(block, trials - start)
+            with uninterrupted():
+                _train_block(units, pool, source, rng, size, history)
+                over = bool(np.all(history.overflowed >= 0))
+                for group, _ in units:
+                    group.write_back()
+            if callback is not None and callback(start + size, history) is False:
+                break
+            if over:
+                break
     for k in np.flatnonzero(history.overflowed >= 0):
         warn_of_overflow(f"agent {k}", int(history.overflowed[k]) + 1)
     return history
 
 
-Unit = tuple[LaneGroup, list[int]]
-"""Agents that one thread trains side by side, and their places in the user's list."""
-
-
 def _train_block(
-    units: list[Unit], pool: ThreadPoolExecutor, rng: Generator, size: int, history: History
+    units: list[Unit],
+    pool: ThreadPoolExecutor,
+    source: Source,
+    rng: Generator,
+    size: int,
+    history: History,
 ) -> None:
     """One block of trials for all units, each with its own copy of the stream's generator."""
+    ahead = source.ahead(rng, size)
     # The first unit moves the caller's generator on; the others hear the same from copies.
     streams = [rng] + [copy.deepcopy(rng) for _ in units[1:]]
     wrong = np.empty(len(history.overflowed))
     absolute = np.empty(len(history.overflowed))
     tasks = [
-        pool.submit(group.train, stream, size)
+        pool.submit(group.train, stream, ahead, size)
         for (group, _), stream in zip(units, streams, strict=True)
     ]
+    wait(tasks)
     for (group, places), result in zip(units, tasks, strict=True):
         wrong[places], absolute[places] = result.result()
         history.overflowed[places] = group.overflowed()
     history.append(size, wrong, absolute)
 
 
-def _write_back(units: list[Unit]) -> None:
-    for group, _ in units:
-        group.write_back()
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ctrl-C inside waits until the end, however often it comes: what is inside is done whole."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield  # interrupts come to the main thread only, or not at all
+        return
+    came: list[Any] = []
+
+    def note(number: int, frame: Any) -> None:
+        came.append((number, frame))
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            handler(*came[0])
+
+
+def _refuse_twice(agents: Any) -> None:
+    seen: dict[int, int] = {}
+    for place, agent in enumerate(agents if isinstance(agents, Sequence) else ()):
+        first = seen.setdefault(id(agent), place)
+        if first != place:
+            raise ValueError(
+                f"agents must be different objects, but agent {place} is agent {first} again: "
+                "make one agent for each place"
+            )
+
+
+def generator_from(seed: Any) -> Generator:
+    """`seed` as a Generator: itself if it is one, else a new one; ValueError if it cannot be."""
+    if isinstance(seed, Generator):
+        return seed
+    if seed is None:
+        return np.random.default_rng()
+    return np.random.default_rng(whole("seed", seed, low=0, high=2**128 - 1))
 
 
 def thread_count(threads: int | None) -> int:
@@ -132,10 +187,10 @@ def thread_count(threads: int | None) -> int:
     if threads is None:
         can_tell = hasattr(os, "sched_getaffinity")
         return len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
-    return whole("threads", threads, low=1)
+    return whole("threads", threads, low=1, high=1_024)
 
 
-def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: int) -> list[Unit]:
+def lane_groups(agents: Sequence[Any], source: Source, threads: int) -> list[Any]:
     """Agents grouped by kind and cut into units for the threads, each with its agents' places."""
     if not isinstance(agents, Sequence) or len(agents) == 0:
         raise ValueError(f"agents must be a list of at least one agent, got {agents!r}")
@@ -145,22 +200,23 @@ def lane_groups(agents: Sequence[Any], task: Task, patterns: Patterns, threads: 
                 f"agents must be agents, such as NeuronAgent makes, got {agent!r} as agent {place}"
             )
     n_weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
-    require_memory(n_weights, len(agents), task, threads)
+    require_memory(n_weights, len(agents), source, threads)
     kinds: dict[Hashable, list[int]] = defaultdict(list)
     for place, agent in enumerate(agents):
         kinds[agent.group_key()].append(place)
-    units: list[Unit] = []
+    units: list[Any] = []
     for places in kinds.values():
-        for part in _parts(places, threads):
+        widest = getattr(getattr(agents[places[0]], "model", None), "widest", Model.widest)
+        for part in _parts(places, threads, widest):
             members = [agents[place] for place in part]
-            units.append((type(members[0]).lanes(members, task, patterns), part))
+            units.append((type(members[0]).batch(members, source), part))
     return units
 
 
-def _parts(places: list[int], threads: int) -> list[list[int]]:
+def _parts(places: list[int], threads: int, width: int) -> list[list[int]]:
     """Runs of nearly equal length, cut between blocks of lanes: as many for each thread."""
-    blocks = -(-len(places) // LANES_PER_BLOCK)
+    blocks = -(-len(places) // width)
     shares = max(1, min(SHARES, blocks // (threads * BLOCKS_PER_SHARE))) if threads > 1 else 1
     parts = min(threads * shares, blocks)
-    cuts = np.linspace(0, blocks, parts + 1).round().astype(int) * LANES_PER_BLOCK
+    cuts = np.linspace(0, blocks, parts + 1).round().astype(int) * width
     return [places[a:b] for a, b in itertools.pairwise(cuts)]

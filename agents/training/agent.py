@@ -1,0 +1,501 @@
+"""The agent shell: a model with weights and a learning rule, acting bin by bin."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from agents import checkpoint, registry
+from agents.learning.rule import FEEDBACK, Rule
+from agents.model import Arrays, Model
+from agents.recording import Recording
+from agents.training.batch import AgentBatch
+from agents.training.binding import loops, recorder
+from agents.training.source import Source
+from agents.training.stepwise import Heard
+from agents.training.streams import WRONG_BEYOND
+from agents.training.told import Told, segments_told, whole_trial
+from agents.training.trial import ModelBlock, RuleBlock
+from gnm_env.checks import real, whole
+from gnm_env.task import Patterns, Task
+from gnm_env.trial import Trial
+
+MAX_INPUTS = 10_000_000
+"""Most input channels of an agent."""
+
+MAX_WEIGHTS = 100_000_000
+"""Most weights of an agent: learning keeps three numbers for each, 2.4 GB at this size."""
+
+Bounds = tuple[float, float] | None
+
+
+class Agent:
+    """Base of the agents: weights, acting, learning, prediction, recording, checkpoints.
+
+    A subclass says in `models` which models it takes and in `name` how checkpoints call it.
+    """
+
+    name: ClassVar[str]
+    models: ClassVar[type[Model]]
+    model_role: ClassVar[str]
+    """What messages call the model: "neuron" or "network"."""
+    wrong_beyond: ClassVar[float] = WRONG_BEYOND
+    """A trial is answered wrongly if its sum is further than this from the label."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        registry.register("agent", cls)
+
+    def __init__(
+        self,
+        model: Model,
+        rule: Rule,
+        n_inputs: int,
+        seed: int,
+        initial_weight: float | None,
+        weight_bounds: Bounds,
+    ) -> None:
+        self._model = self._checked_model(model)
+        self._rule = _checked_rule(rule)
+        self._n_inputs = whole("n_inputs", n_inputs, low=1, high=MAX_INPUTS)
+        size = model.n_weights(self._n_inputs)
+        if size > MAX_WEIGHTS:
+            raise ValueError(
+                f"an agent must have at most {MAX_WEIGHTS:,} weights, got {size:,} for "
+                f"{self._n_inputs:,} inputs: lower n_inputs, or hidden of a network"
+            )
+        self._weight_bounds = _checked_bounds(weight_bounds)
+        rule.kernel(model)  # refuses a model that the rule cannot teach
+        rule.static(self._n_inputs)
+        if initial_weight is None:
+            initial_weight = model.default_initial_weight
+        scale = real("initial_weight", initial_weight, low=-1e100, high=1e100)
+        rng = np.random.default_rng((whole("seed", seed, low=0, high=2**128 - 1), 2))
+        drawn = model.initial_weights(rng, self._n_inputs, scale)
+        self._weights = np.clip(drawn, *self.bounds)
+        self._velocity = np.zeros(size)
+        self._trials = 0
+        self.overflowed = False
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """What is derived from the rest, and is not kept in checkpoints or pickles."""
+        model, rule = self._model, self._rule
+        self._loops = loops(model, rule)
+        self._n_state = len(model.state_type._fields)  # type: ignore[attr-defined]
+        states = np.zeros((self._n_state + model.n_memory, 1))
+        self._state, memory = states[: self._n_state], states[self._n_state :]
+        static = model.static(self._n_inputs)
+        parameters = np.array(model.parameters(), np.float64)[:, None]
+        arrays = Arrays(self._weights[:, None], memory, np.empty((0, 1)))
+        self._block = ModelBlock(parameters, arrays, static, model.n_notes)
+        self._rule_block = RuleBlock(
+            np.array(self.rule_parameters(), np.float64)[:, None],
+            self._velocity[:, None],
+            rule.static(self._n_inputs),
+        )
+        self._heard: Heard | None = None
+        self._make_room(256, 4 * self._n_inputs + 256)
+        self.begin_trial()
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = ("_model", "_rule", "_n_inputs", "_weight_bounds", "_weights", "_velocity")
+        return {name: getattr(self, name) for name in (*kept, "_trials", "overflowed")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._model!r}, {self._rule!r}, n_inputs={self._n_inputs})"
+
+    # --- what it is made of ----------------------------------------------------------------------
+
+    @property
+    def model(self) -> Any:
+        """The neuron or network."""
+        return self._model
+
+    @property
+    def rule(self) -> Any:
+        """The learning rule."""
+        return self._rule
+
+    @property
+    def n_inputs(self) -> int:
+        """N, number of input channels."""
+        return self._n_inputs
+
+    @property
+    def weight_bounds(self) -> Bounds:
+        """Lowest and highest weight; None: unbounded."""
+        return self._weight_bounds
+
+    @property
+    def trials(self) -> int:
+        """Trials that it has learned from, or might have."""
+        return self._trials
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """float64, the agent's own writable array; assigning copies into it, checked."""
+        return self._weights
+
+    @weights.setter
+    def weights(self, values: ArrayLike) -> None:
+        put("weights", values, self._weights)
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """float64, Δw of the last learning step, momentum included; assigning copies, checked."""
+        return self._velocity
+
+    @velocity.setter
+    def velocity(self, values: ArrayLike) -> None:
+        put("velocity", values, self._velocity)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest weight; infinite where there is no bound."""
+        return self._weight_bounds or (-np.inf, np.inf)
+
+    def rule_parameters(self) -> tuple[float, ...]:
+        """The numbers of the rule as compiled code takes them."""
+        parameters: tuple[float, ...] = self._rule.parameters(self._model, self.bounds)
+        return parameters
+
+    def _checked_model(self, model: Any) -> Model:
+        role, expected = self.model_role, self.models
+        if isinstance(model, type) and issubclass(model, Model):
+            raise ValueError(
+                f"{role} must be an instance, got the class {model.__name__}; "
+                f"write {model.__name__}()"
+            )
+        if not isinstance(model, expected):
+            hint = ""
+            if isinstance(model, Model):
+                hint = f"; {_agent_for(model)} is the agent for it"
+            raise ValueError(
+                f"{role} must be one of {_names(expected)}, or a class of yours derived from "
+                f"{expected.__name__}, got {model!r}{hint}"
+            )
+        return model
+
+    # --- the standard loop -----------------------------------------------------------------------
+
+    def begin_trial(self) -> None:
+        """Forget the last trial: state 0, empty record. Checks that the weights are finite."""
+        require_finite("weights", self._weights)
+        assert self._heard is not None
+        self._state[:] = 0.0
+        self._block.arrays.memory[:] = 0.0
+        self._bin = 0
+        self._heard.offsets[0] = 0
+
+    def act(self, obs: NDArray[Any]) -> Any:
+        """The answer to one bin: 1 for an output spike, else 0. `obs` holds N bits."""
+        return int(self._step(obs))
+
+    def _step(self, obs: NDArray[Any]) -> float:
+        row = self._checked(obs, (self._n_inputs,))
+        assert self._heard is not None
+        out: float = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        if out < 0.0:
+            self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
+            out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        self._bin += 1
+        return out
+
+    def learn(self, reward: float, info: Mapping[str, Any], sign_only: bool = False) -> None:
+        """Learn from the trial that has just ended.
+
+        `reward` is that of the last step and `info` its terminal info. With `sign_only` (the
+        environment gives feedback="sign") only the reward is used. A weight that would overflow
+        ends learning: `overflowed` is set, the last weights are kept.
+
+        Raises:
+            ValueError: if reward or info are no numbers, do not agree with what was heard, or do
+                not tell what the rule needs.
+        """
+        told = self._told(reward, info, sign_only)
+        self._trials += 1
+        if self.overflowed:
+            return
+        assert self._heard is not None
+        decay_trials = self._rule.decay_trials
+        decay = 0.0 if decay_trials is None else 1.0 / decay_trials
+        left = 1.0 - float(self._trials - 1) * decay
+        rate = self.rule_parameters()[0] * max(left, 0.0)
+        trial = told.arrays(self._heard.channels, self._heard.offsets[: self._bin + 1])
+        outcome = self._loops.update(
+            self._rule_block, self._block, trial, self._heard, told.told, told.label, rate
+        )
+        self.overflowed = outcome < 0
+
+    def _told(self, reward: float, info: Mapping[str, Any], sign_only: bool) -> Told:
+        """What the rule may know, checked."""
+        feedback = self._rule.feedback
+        if not isinstance(reward, numbers.Real) or not math.isfinite(reward):
+            raise ValueError(f"reward must be a finite number, got {reward!r}")
+        assert self._heard is not None
+        given = float(self._heard.output[: self._bin].sum())
+        if "emitted" in info and abs(float(info["emitted"]) - given) > 1e-6 * max(1.0, given):
+            raise ValueError(
+                f"the environment counted {info['emitted']} of output and the agent gave {given:g} "
+                f"in {self._bin} bins: an agent must hear and answer every bin of a trial, so "
+                "wrappers that skip bins or change actions cannot be used"
+            )
+        if feedback == "reward":
+            return whole_trial(self._bin, told=float(reward) - 1.0)
+        if feedback == "none":
+            return whole_trial(self._bin, told=1.0)
+        if sign_only:
+            if feedback != "sign":
+                raise ValueError(
+                    f"{type(self._rule).__name__} needs to know {FEEDBACK[feedback]}, and this "
+                    'environment tells the sign of the error only: use feedback="cost", or a rule '
+                    "such as AggregateLabel or CriticalThreshold"
+                )
+            return whole_trial(self._bin, told=float(np.sign(reward)))
+        return segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+
+    def _make_room(self, bins: int, events: int) -> None:
+        """Buffers for at least `bins` bins and `events` input spikes; what they hold is kept."""
+        long = Heard(
+            np.empty(events, np.int32),
+            np.zeros(bins + 1, np.int64),
+            np.empty((bins, 1)),
+            np.empty((bins, 1)),
+            np.empty((bins, 1)),
+            np.empty((bins * self._model.n_notes, 1)),
+        )
+        if self._heard is not None:
+            pairs: Any = zip(self._heard, long, strict=True)
+            for short, place in pairs:
+                place[: len(short)] = short
+        self._heard = long
+
+    # --- without learning ------------------------------------------------------------------------
+
+    def predict(
+        self,
+        observation: NDArray[Any] | dict[str, NDArray[Any]],
+        state: tuple[NDArray[Any], ...] | None = None,
+        episode_start: NDArray[Any] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
+        """Actions for one bin, as Stable-Baselines3 asks for them; changes nothing.
+
+        `observation` of shape (N,) gives a 0-d action, (n, N) gives n of them for n independent
+        streams. Pass the returned, opaque state to the next call; `episode_start` (n,) says where
+        a new trial begins. The answer is deterministic whatever `deterministic` says.
+        """
+        outputs, states = self._predicted(observation, state, episode_start)
+        actions = outputs.astype(np.int64)
+        return (actions.reshape(()) if np.asarray(observation).ndim == 1 else actions), (states,)
+
+    def _predicted(
+        self, observation: Any, state: Any, episode_start: Any
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Outputs (n,) of n streams for one bin, and their states."""
+        obs = np.asarray(observation)
+        obs = obs[None] if obs.ndim == 1 else obs
+        rows = self._checked(obs, (*obs.shape[:1], self._n_inputs))
+        shape = (len(rows), self._n_state + self._model.n_memory, 1)
+        states = np.zeros(shape) if state is None else _checked_state(state, shape)
+        if episode_start is not None:
+            begins = np.atleast_1d(np.asarray(episode_start, np.bool_))
+            if begins.shape != (len(rows),):
+                raise ValueError(
+                    f"episode_start must have shape ({len(rows)},), one per stream, "
+                    f"got {begins.shape}"
+                )
+            states[begins] = 0.0
+        require_finite("weights", self._weights)
+        return self._loops.predict(self._block, self._n_state, states, rows), states
+
+    def record(self, trial: Trial) -> Recording:
+        """See `agents.record`."""
+        arrays = Arrays(
+            self._weights[:, None], np.zeros((self._model.n_memory, 1)),
+            np.empty((self._model.n_notes, 1)),
+        )  # fmt: skip
+        block = ModelBlock(self._block.parameters, arrays, self._block.static, self._block.n_notes)
+        values, given, memory = recorder(self._model)(block, trial.arrays)
+        return self._recording(values, given, memory)
+
+    def _recording(
+        self, values: NDArray[Any], given: NDArray[np.float64], memory: NDArray[np.float64]
+    ) -> Recording:
+        V, D, R, X, spikes = values
+        return Recording(V, D, R, X, spikes > 0.0)
+
+    def _checked(self, obs: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.int8]:
+        """`obs` as contiguous bits of this shape."""
+        if type(obs) is not np.ndarray or obs.dtype != np.int8 or not obs.flags.c_contiguous:
+            obs = _bits(obs)
+        if obs.shape != shape:
+            raise ValueError(
+                f"an observation must have shape {shape} (n_inputs = {self._n_inputs}), "
+                f"got {obs.shape}"
+            )
+        return obs
+
+    # --- many at once ----------------------------------------------------------------------------
+
+    def group_key(self) -> Hashable:
+        """Agents with equal keys can be trained side by side."""
+        model, rule = self._model, self._rule
+        _, advance = model.advance()
+        biexponential = rule.kernel(model).biexponential
+        return (
+            type(self), advance, model.static(self._n_inputs), type(rule),
+            rule.static(self._n_inputs), biexponential, self._n_inputs,
+        )  # fmt: skip
+
+    @classmethod
+    def batch(cls, agents: Sequence[Self], source: Source) -> AgentBatch:
+        """The agents, all of one `group_key`, side by side."""
+        return AgentBatch(agents, source)
+
+    def _take(
+        self, weights: NDArray[np.float64], velocity: NDArray[np.float64], trials: int, over: bool
+    ) -> None:
+        """What training side by side has made of it."""
+        self._weights[:] = weights
+        self._velocity[:] = velocity
+        self._trials, self.overflowed = trials, over
+
+    # --- checkpoints -----------------------------------------------------------------------------
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        task: Task | None = None,
+        patterns: Patterns | None = None,
+        rng: Generator | None = None,
+    ) -> None:
+        """Save to exactly this one file, whole or not at all, with what else is to be kept.
+
+        Raises ValueError for what could not be loaded again.
+        """
+        checkpoint.save_agent(path, self, task=task, patterns=patterns, rng=rng)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Load an agent; ValueError if the file is missing, damaged or of another kind."""
+        return checkpoint.load_agent(path, cls)
+
+    @classmethod
+    def rebuilt(cls, model: Any, rule: Any, n_inputs: int, weight_bounds: Bounds) -> Self:
+        """A new agent of these parts."""
+        return cls(model, rule, n_inputs, weight_bounds=weight_bounds)  # type: ignore[call-arg]
+
+    def replaced(self, **changes: Any) -> Self:
+        """A copy with other parameters of its model, such as alpha=0.2; the weights are kept."""
+        model = replace(self._model, **changes)  # type: ignore[type-var]
+        agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
+        agent.weights, agent.velocity = self._weights, self._velocity
+        agent._trials = self._trials
+        return agent
+
+
+def put(name: str, values: ArrayLike, place: NDArray[np.float64]) -> None:
+    """Copy `values`, one for each or one for all, into `place`; ValueError if they do not fit."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{name} must be real numbers, got {array.dtype} values")
+    if array.shape not in ((), place.shape):
+        raise ValueError(f"{name} must have shape {place.shape}, got {array.shape}")
+    array = array.astype(np.float64)
+    require_finite(name, array)
+    place[:] = array
+
+
+def require_finite(name: str, values: NDArray[np.float64]) -> None:
+    """ValueError unless all `values` are finite."""
+    if not np.isfinite(values).all():
+        bad = int(np.flatnonzero(~np.isfinite(np.atleast_1d(values)))[0])
+        raise ValueError(
+            f"{name} must be finite, got {np.atleast_1d(values)[bad]} for input {bad}; "
+            "load an earlier checkpoint or start anew"
+        )
+
+
+def _bits(obs: Any) -> NDArray[np.int8]:
+    """Observations of another type as int8; ValueError unless they are 0 and 1."""
+    array = np.asarray(obs)
+    if array.dtype.kind not in "fiub" or not np.isin(array, (0, 1)).all():
+        raise ValueError(
+            "an observation must hold the bits of a bin, 0 and 1, as the environments give them; "
+            f"got {array.dtype} values other than these: wrappers such as SynapticTrace are for "
+            "reinforcement learning"
+        )
+    return np.ascontiguousarray(array, np.int8)
+
+
+def _checked_state(state: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    if not isinstance(state, tuple) or len(state) != 1:
+        raise ValueError(
+            f"state must be what predict returned, or None, got {type(state).__name__}"
+        )
+    states = np.asarray(state[0])
+    if states.dtype != np.float64 or states.shape != shape:
+        raise ValueError(
+            f"state must be what predict returned for as many streams, float64 of shape {shape}, "
+            f"got {states.dtype} of shape {states.shape}"
+        )
+    return np.array(states, order="C")
+
+
+def _checked_rule(rule: Any) -> Rule:
+    if isinstance(rule, type) and issubclass(rule, Rule):
+        raise ValueError(
+            f"rule must be an instance, got the class {rule.__name__}; write {rule.__name__}()"
+        )
+    if not isinstance(rule, Rule):
+        known = ", ".join(cls.__name__ for cls in registry.rules().values())
+        raise ValueError(
+            f"rule must be one of {known}, or a class of yours derived from Rule, got {rule!r}"
+        )
+    return rule
+
+
+def _names(expected: type) -> str:
+    known = (cls.__name__ for cls in registry.neurons().values() if issubclass(cls, expected))
+    return ", ".join(known) or expected.__name__
+
+
+def _agent_for(model: Model) -> str:
+    for cls in registry.agents().values():
+        if isinstance(model, cls.models):  # type: ignore[attr-defined]
+            return cls.__name__
+    return "an agent class of yours"
+
+
+def _checked_bounds(bounds: Bounds) -> Bounds:
+    if bounds is None:
+        return None
+    try:
+        low, high = bounds
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"weight_bounds must be (lowest, highest) or None, got {bounds!r}"
+        ) from None
+    low = real("the lower weight bound", low, finite=False)
+    high = real("the upper weight bound", high, finite=False)
+    if not low < high:
+        raise ValueError(
+            f"weight_bounds must be (lowest, highest) with lowest < highest, got {bounds!r}; "
+            "use None for no bounds"
+        )
+    return low, high

@@ -1,0 +1,240 @@
+"""Many models on one stream: training, noisy performance, responses per class."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from agents.learning.rule import RuleParameters
+from agents.model import Arrays, Block
+from agents.simd import any_lane, full, load, pack, store, unpack, where
+from agents.training.batches import new_batch, trial_of
+from agents.training.slots import (
+    USES_ERROR,
+    USES_OUTPUT,
+    WIDTH,
+    Parameters,
+    State,
+    advance,
+    correction,
+    fill_batch,
+    learn_trial,
+    output,
+    run_trial,
+)
+from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
+from gnm_env.compiled import inlined
+from gnm_env.rules import compiled_too_few as too_few
+from gnm_env.rules import compiled_too_many as too_many
+from gnm_env.sampling import append_piece
+from gnm_env.task import TaskArrays
+
+MOST_SPIKES = 10
+"""Responses are counted up to this many spikes per presentation; the last count means "or more"."""
+
+WRONG_BEYOND = 0.5
+"""A trial is answered wrongly if its sum is further than this from the label."""
+
+
+class Models(NamedTuple):
+    """All blocks of models."""
+
+    parameters: Block
+    """(blocks, rows, WIDTH)"""
+    weights: Block
+    """(blocks, weights, WIDTH)"""
+    static: tuple[int, ...]
+    n_state: int
+    n_memory: int
+    n_notes: int
+
+
+class Learning(NamedTuple):
+    """What all blocks learn by."""
+
+    parameters: Block
+    """(blocks, rows, WIDTH)"""
+    velocity: Block
+    """(blocks, weights, WIDTH)"""
+    overflow: Block
+    """(blocks, 1, WIDTH); the trial in which a weight would have overflowed, or −1."""
+    heard: Block
+    """(blocks, 1, WIDTH); trials that each model had heard before."""
+    static: tuple[int, ...]
+
+
+@inlined
+def block_of(models: Models, block: int, memory: Block, notes: Block) -> ModelBlock:
+    """Block `block` of the models."""
+    arrays = Arrays(models.weights[block], memory, notes)
+    return ModelBlock(models.parameters[block], arrays, models.static, models.n_notes)
+
+
+def train_template(
+    rng: Generator, source: Any, trials: int, models: Models, learning: Learning, first_trial: int
+) -> tuple[Block, Block]:
+    """Every model of every block hears and learns `trials` trials of `source`.
+
+    `first_trial` numbers the first of them. Returns the number of trials answered wrongly and
+    Σ |label − emitted|, (blocks, 1, WIDTH) each.
+    """
+    zero = full(0.0, WIDTH)
+    n_blocks = len(models.weights)
+    wrong = np.zeros((n_blocks, 1, WIDTH))
+    absolute = np.zeros((n_blocks, 1, WIDTH))
+    memory = np.zeros((models.n_memory, WIDTH))
+    scratch = new_scratch(models.weights.shape[1], WIDTH)
+    notes = np.empty((0, WIDTH))
+    log = TrialLog(
+        np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH))
+    )
+    batch = new_batch()
+    done = 0
+    while done < trials:
+        batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
+        if longest > len(log.V) or batch.edges.size > len(log.counts):
+            bins = max(2 * longest, len(log.V))
+            log = TrialLog(
+                np.empty((bins, WIDTH)),
+                np.empty((bins if USES_ERROR else 0, WIDTH)),
+                np.empty((bins if USES_OUTPUT else 0, WIDTH)),
+                np.empty((batch.edges.size, WIDTH)),
+            )
+            notes = np.empty((bins * models.n_notes, WIDTH))
+        for block in range(n_blocks):
+            p = unpack(Parameters, models.parameters[block], zero)
+            # Out of the inner loop, where a view of an array costs as much as some bins.
+            model = block_of(models, block, memory, notes)
+            rule = RuleBlock(learning.parameters[block], learning.velocity[block], learning.static)
+            decay = unpack(RuleParameters, learning.parameters[block], zero).decay
+            rate = unpack(RuleParameters, learning.parameters[block], zero).learning_rate
+            heard = load(learning.heard[block], 0, zero) + float(first_trial + done)
+            overflowed_in = load(learning.overflow[block], 0, zero)
+            n_wrong = load(wrong[block], 0, zero)
+            total_error = load(absolute[block], 0, zero)
+            for k in range(drawn):
+                trial = trial_of(batch, k)
+                outcome, _ = run_trial(p, model, trial, log)
+                error = outcome.label - outcome.emitted
+                error = where(error < 0.0, zero - error, error)
+                n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
+                total_error = total_error + error
+                c = where(overflowed_in < 0.0, correction(outcome), zero)
+                if any_lane(c != 0.0):
+                    store(scratch.corrections, 0, c)
+                    left = 1.0 - (heard + float(k)) * decay
+                    store(scratch.rates, 0, rate * where(left > 0.0, left, zero))
+                    learn_trial(rule, model, trial, log, scratch)
+                    taught = load(scratch.corrections, 0, zero) != 0.0
+                    failed = taught & (load(scratch.finite, 0, zero) == 0.0)
+                    overflowed_in = where(failed, float(first_trial + done + k), overflowed_in)
+            store(learning.overflow[block], 0, overflowed_in)
+            store(wrong[block], 0, n_wrong)
+            store(absolute[block], 0, total_error)
+        done += drawn
+    return wrong, absolute
+
+
+def survive_template(rng: Generator, task: TaskArrays, cap: int, models: Models) -> Block:
+    """Bins that each model survives on one endless stream from `rng`, at most `cap`.
+
+    Mistakes are those of `gnm_env.rules`; the bin of the mistake is not counted. Returns shape
+    (blocks, 1, WIDTH).
+    """
+    zero = full(0.0, WIDTH)
+    n_blocks = len(models.weights)
+    bins = np.zeros((n_blocks, 1, WIDTH))
+    alive = np.ones((n_blocks, 1, WIDTH))
+    counts = np.zeros((n_blocks, 1, WIDTH))
+    states = np.zeros((n_blocks, models.n_state, WIDTH))
+    memories = np.zeros((n_blocks, models.n_memory, WIDTH))
+    notes = np.empty((models.n_notes, WIDTH))
+    channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
+    noise_left = -1.0
+    heard_bins = 0
+    while heard_bins < cap and alive.any():
+        channels, offsets, n_noise, class_, noise_left = append_piece(
+            rng, task, noise_left, channels, offsets, 0
+        )
+        n_bins = min(n_noise + (task.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
+        owed = float(task.targets[class_]) if class_ >= 0 else 0.0
+        last_bin = n_noise + task.pattern_bins - 1
+        for block in range(n_blocks):
+            living = load(alive[block], 0, zero)
+            if not any_lane(living > 0.0):
+                continue
+            p = unpack(Parameters, models.parameters[block], zero)
+            state = unpack(State, states[block], zero)
+            survived = load(bins[block], 0, zero)
+            given = load(counts[block], 0, zero)
+            model = block_of(models, block, memories[block], notes)
+            for t in range(n_bins):
+                given = where(t == n_noise, zero, given)
+                state, response = advance(
+                    p, model.static, model.arrays, state, channels, offsets[t], offsets[t + 1], 0
+                )
+                given = given + output(response, zero)
+                living = where(too_many(given, 0.0 if t < n_noise else owed), zero, living)
+                if t == last_bin:
+                    living = where(too_few(given, owed), zero, living)
+                survived = survived + living
+            pack(states[block], state)
+            store(alive[block], 0, living)
+            store(bins[block], 0, survived)
+            # The next piece goes on in the same noise, unless a pattern has ended this one.
+            store(counts[block], 0, given if class_ < 0 else zero)
+        heard_bins += n_bins
+    return bins
+
+
+def answer_template(
+    rng: Generator, source: Any, trials: int, n_classes: int, models: Models
+) -> tuple[NDArray[np.int64], Block, Block, Block, int]:
+    """Responses of each model to `trials` trials of `source`, without learning.
+
+    Returns how often each number of spikes was given to each class, (blocks, WIDTH, C,
+    MOST_SPIKES + 1); output spikes in noise, trials answered wrongly and Σ |label − emitted|,
+    (blocks, 1, WIDTH); and the number of noise bins. Amounts are rounded, in each segment.
+    """
+    zero = full(0.0, WIDTH)
+    n_blocks = len(models.weights)
+    table = np.zeros((n_blocks, WIDTH, n_classes, MOST_SPIKES + 1), np.int64)
+    false_positives = np.zeros((n_blocks, 1, WIDTH))
+    wrong = np.zeros((n_blocks, 1, WIDTH))
+    absolute = np.zeros((n_blocks, 1, WIDTH))
+    memory = np.zeros((models.n_memory, WIDTH))
+    batch = new_batch()
+    noise_bins = done = 0
+    while done < trials:
+        batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
+        log = TrialLog(
+            np.empty((longest, WIDTH)),
+            np.empty((longest, WIDTH)),
+            np.empty((longest, WIDTH)),
+            np.empty((batch.edges.size, WIDTH)),
+        )
+        notes = np.empty((longest * models.n_notes, WIDTH))
+        for k in range(drawn):
+            trial = trial_of(batch, k)
+            for segment in range(0, len(trial.target), 2):
+                noise_bins += trial.edges[segment + 1] - trial.edges[segment]
+            for block in range(n_blocks):
+                p = unpack(Parameters, models.parameters[block], zero)
+                outcome, _ = run_trial(p, block_of(models, block, memory, notes), trial, log)
+                error = outcome.label - outcome.emitted
+                error = where(error < 0.0, zero - error, error)
+                store(wrong[block], 0, load(wrong[block], 0, zero) + where(error > 0.5, 1.0, zero))
+                store(absolute[block], 0, load(absolute[block], 0, zero) + error)
+                for segment in range(len(trial.target)):
+                    class_ = batch.classes[batch.edge_of[k] + segment]
+                    for lane in range(WIDTH):
+                        given = int(np.floor(log.counts[segment, lane] + 0.5))
+                        if segment % 2 == 0:
+                            false_positives[block, 0, lane] += given
+                        elif class_ >= 0:
+                            table[block, lane, class_, min(given, MOST_SPIKES)] += 1
+        done += drawn
+    return table, false_positives, wrong, absolute, noise_bins
