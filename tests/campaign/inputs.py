@@ -465,7 +465,7 @@ def _environments() -> list[Case]:
             "patterns=3", "patterns=np.zeros((2, 3, 4))", "patterns=patterns", "patterns='x'",
             "task=task, patterns=Patterns.draw(Task(), 0)", "pattern_seed='x'", "pattern_seed=-1",
             "pattern_seed=2.5", "pattern_seed=None", "task=task, patterns=patterns, pattern_seed='x'",
-            "render_mode='bogus'", "render_mode=3", "render_mode=['human']", "bogus=1", "n_classes=None",
+            "render_mode='bogus'", "bogus=1", "n_classes=None",
             "targets=(2**62,)", "jitter_bins=2**62", "rate=nan", "n_inputs=10**9, pattern_bins=10**6",
             "max_episode_steps='x'",
         ]  # fmt: skip

@@ -80,6 +80,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--size", choices=EVERY, default="small", help="default: %(default)s")
     parser.add_argument("--only", choices=PARTS, action="append", help="default: all parts")
+    parser.add_argument("--count", type=int, help="of configurations, kills; default: by the size")
     parser.add_argument("--owner", default="", help="bad inputs to these files alone, by prefix")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (default 1)")
     parser.add_argument(
@@ -111,9 +112,11 @@ def main() -> int:
             sound &= counts["nonsense"] <= 0.01 * len(results)
         else:
             if part == "configurations":
-                counts = configurations.campaign(CONFIGURATIONS[options.size], options.seed)
+                counts = configurations.campaign(
+                    options.count or CONFIGURATIONS[options.size], options.seed
+                )
             elif part == "kills":
-                counts = kills.campaign(KILLS[options.size], options.seed)
+                counts = kills.campaign(options.count or KILLS[options.size], options.seed)
             else:
                 counts = flips.campaign(*FLIPS[options.size], options.seed)
             sound = counts["wrong"] == 0
