@@ -566,7 +566,7 @@ def _environments() -> list[Case]:
     return _fine(
         made, "seed=True", "pattern_seed=None", "options={'bogus': 1}", "num_envs=10**7", "num_envs=True",
         "env.task = ", "env.patterns = ", "env.potential =", "seed=[1, 2]", "np.random.RandomState", "'trial': None", "{'reset_mask': None}",
-        "np_random = None", "«»env.render", "\nenv.render()", "task=None, rate=2x", "[None, 1.5", "max_episode_steps=None",
+        "np_random = None", "«»env.render", "\nenv.render()", "[None, 1.5", "max_episode_steps=None",
     )  # fmt: skip
 
 
@@ -643,8 +643,6 @@ def _steps() -> list[Case]:
         made,
         "env.step(nope)",
         "env.step(np.zeros(3, object))",
-        "env.step(np.array([0, 1]))nope",
-        "env.step(['0', '1', '0'])nope",
     )
 
 
@@ -703,7 +701,10 @@ def _wrappers() -> list[Case]:
     )
     made += _of(owner, "SeededEpisodes(trial_env(), «»)", [*SEED, "None"])
     made += _of(owner, "env = «»(trial_env())\nenv.step(0)", ["SynapticTrace", "RisingEdge"])
-    return _fine(made, "decays=[[0.3]]", "env.step(np.array([0, 1]))nope")
+    return _fine(
+        made,
+        "decays=[[0.3]]",
+    )
 
 
 # --- agents ---------------------------------------------------------------------------------------
@@ -837,8 +838,7 @@ def _agents() -> list[Case]:
     made += _of("agents/recording.py", "record(«», trial)", ["None", "3", "GNM()", "'x'"])
     return _fine(
         made, "a.velocity", "a.neuron = ", "a.rule = ", "initial_weight=1e308", "a.weight_bounds", "seed=True",
-        "np.zeros(4, object)", "act(np.full(4, 2))nope", "np.zeros(4, np.int8)", "a.weights = np.zeros(1)nope", "a.n_inputs = 4",
-        "a.act(np.zeros(4, complex))nope",
+        "np.zeros(4, object)", "np.zeros(4, np.int8)", "a.n_inputs = 4",
     )  # fmt: skip
 
 
@@ -1094,9 +1094,8 @@ def _running() -> list[Case]:
         ["-1, 0, 0", "'x', 0, 0", "1, 'x', 0", "1, nan, 0", "1, [1, 2], 0", "None, 0, 0"],
     )
     return _fine(
-        made, "seed=True", "GNM(alpha", "callback=[]", "neuron = LIF", "rule = Err", "h.save('curve.csv')", "[agent(), NeuronAgent(GNM(), ErrorTrace(), 5)]nope",
-        "cap=10**30", "mistake_rate([20000])nope", "seed=[1, 2]", "FrameStack", "threads=10**30nope", "History()", "runs=10**12nope", "of(-3)nope",
-        "trials=10**30)nope", "block=10**30", "block=10**5000", "mistake_rate([5], cap=10**30)", "MaxAndSkip", "[1, 2], 0",
+        made, "seed=True", "GNM(alpha", "callback=[]", "neuron = LIF", "rule = Err", "h.save('curve.csv')",
+        "cap=10**30", "seed=[1, 2]", "FrameStack", "History()", "block=10**30", "block=10**5000", "mistake_rate([5], cap=10**30)", "MaxAndSkip", "[1, 2], 0",
     )  # fmt: skip
 
 
@@ -1211,7 +1210,6 @@ def _files() -> list[Case]:
         made,
         "h['overflowed'] = 'x'",
         "h['task'] = None",
-        "c['weights'] = np.zeros(10**6)nope",
         "c['weights'] = np.zeros(4, np.int8)",
         "c['bogus']",
         "h['neuron'] = None",
