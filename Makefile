@@ -15,7 +15,7 @@ WHOLE = import sys, pip; sys.exit(sys.version_info < (3, 11) or sys.prefix == sy
 NEEDS = $(VENV)/.made pyproject.toml constraints.txt
 
 .PHONY: help train evaluate show test test-slow test-checked campaign format benchmark reproduce \
-	report-check league clean distclean
+	report-check league docs docs-open clean distclean
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s%s\n", $$1, $$2 }' Makefile
@@ -60,9 +60,17 @@ report-check: $(VENV)/.for-reproduce  ## open the report in headless Chromium an
 league: $(VENV)/.for-league  ## neurons, network and RL agents in one table
 	@$(RUN) scripts/league.py $(ARGS)
 
+docs: $(VENV)/.for-docs  ## build the documentation: docs/_build/index.html; warnings are errors
+	@$(RUN) -m sphinx -W --keep-going -q -b html docs docs/_build $(ARGS)
+	@echo "docs/_build/index.html"
+
+docs-open: docs  ## build the documentation and show it in the browser
+	@$(RUN) -m webbrowser -t "file://$(CURDIR)/docs/_build/index.html"
+
 clean:  ## remove caches, compiled functions too
 	@find . \( -path ./$(VENV) -o -path ./.git \) -prune -o -type d -name __pycache__ -exec rm -rf {} +
-	@rm -rf .pytest_cache .mypy_cache .ruff_cache build dist *.egg-info
+	@rm -rf .pytest_cache .mypy_cache .ruff_cache build dist *.egg-info docs/_build \
+		docs/tutorials/gallery docs/environments/gnm-* docs/reference/*.rst
 
 distclean: clean  ## remove the virtual environment as well; results stay
 	@rm -rf $(VENV)
@@ -77,8 +85,8 @@ $(VENV)/.for-train: $(NEEDS)
 
 $(VENV)/.for-test: $(NEEDS)
 	@echo "Installing what the tests need into $(VENV); with torch this takes minutes ..."
-	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,dev]"
-	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $@
+	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,docs,dev]"
+	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $(VENV)/.for-docs $@
 
 $(VENV)/.for-benchmark: $(NEEDS)
 	@echo "Installing what the benchmark needs into $(VENV); with torch this takes minutes ..."
@@ -94,6 +102,12 @@ $(VENV)/.for-league: $(NEEDS)
 	@echo "Installing what the league needs into $(VENV); with torch this takes minutes ..."
 	@$(INSTALL) -e ".[pictures,reproduce,rl]"
 	@touch $(VENV)/.for-train $@
+
+# The reference is made from the docstrings of every part, so that every part has to be importable.
+$(VENV)/.for-docs: $(NEEDS)
+	@echo "Installing what the documentation needs into $(VENV); with torch this takes minutes ..."
+	@$(INSTALL) -e ".[pictures,rl,chemistry,reproduce,cluster,docs]"
+	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $@
 
 # An environment that works is kept. The interpreter is tried, not only looked for: a name on the
 # path may be a version manager's stand-in for a version that is not active.

@@ -19,6 +19,7 @@ from agents.neuron_agent import NeuronAgent
 from agents.neurons.gnm import GNM
 from agents.neurons.lif import LIF
 from agents.neurons.mst import MST
+from agents.plotting import plot
 from agents.recording import Recording, record
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
@@ -42,6 +43,7 @@ __all__ = [
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",
+    "plot",
     "record",
     "train",
     "train_many",

@@ -73,6 +73,11 @@ def neurons() -> dict[str, type]:
     return _complete("neuron")
 
 
+def networks() -> dict[str, type]:
+    """All networks defined so far, by name."""
+    return _complete("network")
+
+
 def rules() -> dict[str, type]:
     """All learning rules defined so far, by name."""
     return _complete("rule")
@@ -95,6 +100,11 @@ def find_neuron(spec: str) -> type:
     return find("neuron", spec)
 
 
+def find_model(spec: str) -> type:
+    """A neuron or a network; see `find`."""
+    return find("network" if spec in networks() else "neuron", spec)
+
+
 def find_rule(spec: str) -> type:
     """See `find`."""
     return find("rule", spec)
@@ -114,7 +124,7 @@ def find(kind: str, spec: str) -> type:
                 "yours is given as module:Class or file.py:Class"
             )
         return known[spec]
-    module = _module(place)
+    module = load_module(place)
     cls = getattr(module, class_name, None)
     if not isinstance(cls, type):
         raise ValueError(f"{place} has no class {class_name!r}")
@@ -123,7 +133,7 @@ def find(kind: str, spec: str) -> type:
     return cls
 
 
-def _module(place: str) -> Any:
+def load_module(place: str) -> Any:
     """The module named `place`, or that of the file `place`."""
     if not place.endswith(".py"):
         sys.path.insert(0, "")  # as `python -m` does: modules of the folder one stands in

@@ -12,7 +12,10 @@ from gnm_env.trial import Trial, draw_trial
 from gnm_env.trial_task.env import PatternTrialEnv
 from gnm_env.trials import Trials
 
+__version__ = "0.1.0"
+
 __all__ = [
+    "__version__",
     "PatternStreamEnv",
     "PatternTrialEnv",
     "Patterns",

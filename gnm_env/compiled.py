@@ -90,7 +90,9 @@ def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:
     return dispatcher
 
 
-def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any:
+def specialise(
+    template: Callable[..., Any], label: str, *, inline: bool = False, **bindings: Any
+) -> Any:
     """Compile `template` with some of its global names bound to other functions or constants.
 
     This is how one loop serves every neuron and every rule: the template calls `step`, and each
@@ -106,7 +108,7 @@ def specialise(template: Callable[..., Any], label: str, **bindings: Any) -> Any
     )
     function.__qualname__ = function.__name__
     function.__doc__ = template.__doc__
-    return compiled(function)
+    return inlined(function) if inline else compiled(function)
 
 
 class _Folder(UserWideCacheLocator):

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import os
 import shutil
 import sys
 import time
@@ -25,7 +24,12 @@ from typing import Any
 
 from tqdm import tqdm
 
-import commandline
+import benchmarks  # noqa: F401  before NumPy
+
+# isort: split
+from agents.checkpoint import atomic_write
+from agents.commands import terminal
+from agents.commands.terminal import Parser, at_least
 from benchmarks.report import page, summary, table
 from benchmarks.rows import Findings
 
@@ -51,9 +55,6 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 
 def measure(options: argparse.Namespace) -> Findings:
     """Everything that the command line asks for, saved section by section."""
-    # Before NumPy is imported: one thread is what one core can use.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
     from benchmarks.cores import Cores
     from benchmarks.machine import machine
     from benchmarks.timing import Settings
@@ -103,8 +104,6 @@ def attempt(function: str, settings: Any) -> Findings:
 
 def save(found: Findings, folder: Path) -> None:
     """Write what there is, whole or not at all."""
-    from agents.checkpoint import atomic_write
-
     with atomic_write(folder / "benchmark.json") as file:
         file.write(json.dumps(found.to_json(), indent=1).encode())
 
@@ -125,7 +124,7 @@ def illustrated(found: Findings, folder: Path) -> Path | None:
         draw(found, folder / "benchmark.png")
         return folder / "benchmark.png"
     except ImportError as error:
-        print(f'no picture: {error}; pip install -e ".[pictures]"', file=sys.stderr)
+        print(f'no picture: {error}; pip install "gnm-env[pictures]"', file=sys.stderr)
         return None
 
 
@@ -144,32 +143,23 @@ def command(options: argparse.Namespace) -> str:
 DEFAULTS = (("repeats", 5), ("seed", 0))
 
 
-def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def options(parser: Parser) -> None:
     add = parser.add_argument
-    names = ", ".join(SECTIONS)
-    add("--only", nargs="+", metavar="NAME", choices=SECTIONS, help=f"some of: {names}")
+    # fmt: off
+    add("--only", nargs="+", metavar="NAME", choices=SECTIONS,
+        help=f"some of: {', '.join(SECTIONS)}")
     add("--quick", action="store_true", help="less work per repeat, a minute or two in all")
     add("--full", action="store_true", help="the heat map whole, not a part that is scaled up")
-    add("--repeats", type=int, default=5, metavar="N", help="default: %(default)s")
-    add("--seed", type=int, default=0, help="of the streams; default: %(default)s")
-    add("--out", type=Path, default=Path("results/benchmark"), metavar="FOLDER",
-        help="default: %(default)s")  # fmt: skip
+    add("--repeats", type=at_least(1), default=5, metavar="N", help="(default 5)")
+    terminal.share(parser, "--seed", help="of the streams")
+    terminal.share(parser, "--out", default=Path("results/benchmark"))
     add("--publish", action="store_true", help="write docs/performance.md and its picture")
     add("--last", action="store_true", help="measure nothing: show the last run that is in --out")
-    add("--json", action="store_true", help="end with one JSON object")
-    return parser.parse_args(arguments)
+    # fmt: on
 
 
 def check(options: argparse.Namespace) -> None:
-    """ValueError for numbers out of range and options that exclude each other."""
-    for name, low in (("repeats", 1), ("seed", 0)):
-        value = getattr(options, name)
-        if value < low:
-            raise ValueError(f"--{name} must be >= {low}, got {value}")
+    """ValueError for options that exclude each other."""
     if options.quick and options.full:
         raise ValueError("--quick and --full exclude each other: choose one")
     if options.publish and not options.last:
@@ -205,12 +195,4 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    chosen = parse()
-    result: dict[str, Any] = {}
-
-    def measured() -> dict[str, Any]:
-        result.update(main(chosen))
-        return result
-
-    commandline.run(measured, as_json=chosen.json, name="benchmark")
-    sys.exit(1 if result["failed"] else 0)
+    terminal.run(lambda: sys.modules[__name__], sys.argv[1:], "benchmark.py")

@@ -105,5 +105,7 @@ _ADVANCES: dict[Any, Any] = {}
 def _advance(labelled: tuple[str, Any]) -> tuple[str, Any]:
     label, compiled_step = labelled
     if compiled_step not in _ADVANCES:
-        _ADVANCES[compiled_step] = specialise(advance_template, label, step=compiled_step)
+        _ADVANCES[compiled_step] = specialise(
+            advance_template, label, inline=True, step=compiled_step
+        )
     return label, _ADVANCES[compiled_step]

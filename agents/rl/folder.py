@@ -4,7 +4,8 @@
     best_model.zip    the best by periodic evaluation, if there was one
     task.json         kind of agent, senses, task, feedback and patterns
 
-SB3's zip holds pickled objects: load only what you trust.
+SB3's zip holds pickled objects, which may run any program when they are opened: `load` only what
+you trust. The seal beside each (see `agents.rl.trust`) tells the command line which are your own.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from agents.rl import trust
 from agents.rl.recipes import RECIPES
 from agents.rl.sb3_agent import SB3Agent
 from agents.rl.senses import Senses
@@ -91,11 +93,12 @@ def described(folder: str | os.PathLike[str]) -> Description:
 
 
 def save_model(path: str | os.PathLike[str], model: BaseAlgorithm) -> None:
-    """SB3's `model.save`, whole or not at all."""
+    """SB3's `model.save`, whole or not at all, and sealed as this user's own."""
     contents = io.BytesIO()
     model.save(contents)
     with atomic_write(path) as file:
         file.write(contents.getvalue())
+    trust.seal(path)
 
 
 def save(
@@ -126,7 +129,8 @@ def save(
 def load(folder: str | os.PathLike[str]) -> tuple[SB3Agent, Task, Patterns]:
     """The best agent of a folder, ready to be scored, with its task and patterns.
 
-    That is best_model.zip where there is one, else model.zip. Raises ValueError if a file is
+    That is best_model.zip where there is one, else model.zip: pickled objects, so load only what
+    you trust. Raises ValueError if a file is
     missing or damaged, or if they do not belong together.
     """
     place = Path(folder)

@@ -10,7 +10,7 @@ from typing import Any
 
 from llvmlite import binding
 
-import provenance
+from agents.experiments import provenance
 from benchmarks.cores import Cores
 
 PACKAGES = (

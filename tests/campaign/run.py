@@ -108,7 +108,7 @@ def _arguments() -> argparse.Namespace:
 
 def main() -> int:
     """Run the parts asked for, print their tables, and say whether all is well."""
-    from tests.campaign import configurations, flips, kills
+    from tests.campaign import configurations, flips, kills, stores
 
     options = _arguments()
     summary: dict[str, Any] = {}
@@ -129,9 +129,13 @@ def main() -> int:
                     options.count or CONFIGURATIONS[options.size], options.seed
                 )
             elif part == "kills":
-                counts = kills.campaign(options.count or KILLS[options.size], options.seed)
+                count = options.count or KILLS[options.size]
+                counts = kills.campaign(count, options.seed)
+                counts.update(stores.campaign(count, 0, options.seed))
             else:
-                counts = flips.campaign(*FLIPS[options.size], options.seed)
+                checkpoints, others = FLIPS[options.size]
+                counts = flips.campaign(checkpoints, others, options.seed)
+                counts.update(stores.campaign(0, others, options.seed))
             sound = counts["wrong"] == 0
             print(f"{part}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
         summary[part] = {**counts, "seconds": round(time.monotonic() - start)}

@@ -44,9 +44,8 @@ def campaign(kills: int, flips: int, seed: int) -> Counter[str]:
 
 def fill(folder: Path, repair: bool = False) -> None:
     """Compute whatever is still to be computed."""
-    from tests.agents.experiments.toys import toy, work
-
     from agents.experiments.store import open_store
+    from tests.agents.experiments.toys import toy, work
 
     with open_store(folder, toy(seeds=SEEDS), repair=repair) as store:
         for block in store.pending():
@@ -57,11 +56,11 @@ def killed_sweeps(count: int, folder: Path, rng: random.Random) -> list[str]:
     """What is wrong after each of `count` kills of a sweep that is begun anew when it is done."""
     import dask.array  # noqa: F401  what xarray imports for the first store of a process
     import numpy as np
-    from tests.agents.experiments.toys import toy
 
     from agents.experiments.store import read, summarise
     from agents.experiments.sweep import sweep
     from agents.experiments.workers import threads
+    from tests.agents.experiments.toys import toy
 
     experiment = toy(seeds=SEEDS, pause=0.01)
     whole = folder / "whole"

@@ -1,0 +1,172 @@
+"""F6: LIF neurons of every refractory period beside the GNM."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.experiments.design import Experiment
+from agents.experiments.figures import Picture
+from agents.experiments.methods import GNM_ALL, LIF_ALL, initial_weights
+from agents.experiments.statistics import Interval, bootstrap, by_seed, score
+from agents.experiments.training import STARTS, class_counts, learners, pattern_seeds, training
+from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
+from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+# --- the grid ------------------------------------------------------------------------------------
+
+REFRACTORY = tuple(range(26))
+"""Refractory periods, in bins."""
+
+SEEDS = {"quick": 6, "paper": 48}
+
+
+def refractory(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
+    """LIF neurons of every refractory period beside a GNM, one and three classes."""
+    rows = {"GNM": GNM_ALL, **{f"LIF {n}": {**LIF_ALL, "refractory": n} for n in REFRACTORY}}
+    axes = (
+        class_counts(1, 3),
+        pattern_seeds(seeds or range(SEEDS[size])),
+        initial_weights(),
+        learners(rows),
+    )
+    return training("F6", "LIF against GNM, by refractory period", axes)
+
+
+# --- the claims ----------------------------------------------------------------------------------
+
+COMPARABLE = (0.8, 1.25)
+FLAT = 1e-9
+"""Slopes up to this are rounding."""
+
+_LIF = [f"LIF {n}" for n in REFRACTORY]
+
+
+def ratios(results: xr.Dataset, classes: int, start: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Scores of the LIF neurons (seeds, refractory periods) and of the GNM (seeds, 1)."""
+    scores = score(results).sel(classes=classes, start=start)
+    return by_seed(scores.sel(learner=_LIF)), by_seed(scores.sel(learner=["GNM"]))
+
+
+def ratio(lif: NDArray[Any], gnm: NDArray[Any]) -> Any:
+    """Mean score of the LIF neurons over that of the GNM, one per refractory period."""
+    return lif.mean(axis=0) / gnm.mean(axis=0)
+
+
+def _slope(lif: NDArray[Any], gnm: NDArray[Any]) -> float:
+    """Change of the ratio per bin of refractory period, by least squares."""
+    return float(np.polyfit(REFRACTORY, ratio(lif, gnm), 1)[0])
+
+
+def _ratio_at(refractory: int, lif: NDArray[Any], gnm: NDArray[Any]) -> Interval:
+    return bootstrap(lambda a, b: float(ratio(a, b)[refractory]), lif, gnm)
+
+
+def _ratio_words(start: str, lif: NDArray[Any], gnm: NDArray[Any], slope: Interval) -> str:
+    first, last = _ratio_at(0, lif, gnm), _ratio_at(REFRACTORY[-1], lif, gnm)
+    scaled = Interval(*(25 * end for end in slope))
+    return (
+        f"{start}: ratio {first:.2f} at 0, {last:.2f} at 25 bins, trend over 25 bins {scaled:+.2f}"
+    )
+
+
+def _judge_one_class(results: Results) -> Finding:
+    def judge(start: str) -> Tried:
+        lif, gnm = ratios(results["F6"], 1, start)
+        slope = bootstrap(_slope, lif, gnm)
+        values = ratio(lif, gnm)
+        comparable = bool(np.all((values >= COMPARABLE[0]) & (values <= COMPARABLE[1])))
+        words = _ratio_words(start, lif, gnm, slope)
+        return Tried(
+            comparable and slope.above(FLAT),
+            f"{words}, all in {values.min():.2f} … {values.max():.2f}",
+        )
+
+    return from_both_starts(judge)
+
+
+def _judge_three_classes(results: Results) -> Finding:
+    def judge(start: str) -> Tried:
+        lif, gnm = ratios(results["F6"], 3, start)
+        slope = bootstrap(_slope, lif, gnm)
+        held = _ratio_at(0, lif, gnm).below(1) and slope.below(-FLAT)
+        return Tried(held, _ratio_words(start, lif, gnm, slope))
+
+    return from_both_starts(judge)
+
+
+_PROTOCOL = (
+    "GNM (η 0, α 0.3) and LIF (α 0.3, refractory 0 … 25), ALL, 60,000 trials; matched and "
+    "published initial weights"
+)
+
+CLAIMS = (
+    Claim(
+        "F6a",
+        "Fig. 6",
+        "One class: LIF over GNM is comparable to 1 and rises with the refractory period",
+        _PROTOCOL,
+        f"reproduced if the ratio of means stays in {COMPARABLE[0]:g} … {COMPARABLE[1]:g} for "
+        "every refractory period and its least-squares slope has an interval above 0 (bootstrap "
+        "over seeds), from both starts; conditional on the start",
+        ("F6",),
+        "gnm/PatternStream-v0, 1 class",
+        _judge_one_class,
+    ),
+    Claim(
+        "F6b",
+        "Fig. 6",
+        "Three classes: LIF over GNM is below 1 even without a refractory period, and falls with "
+        "it",
+        _PROTOCOL,
+        "reproduced if the ratio at 0 has an interval below 1 and the slope one below 0 (bootstrap "
+        "over seeds), from both starts; conditional on the start",
+        ("F6",),
+        "gnm/PatternStream-v0, 3 classes",
+        _judge_three_classes,
+    ),
+)
+
+# --- the figure ----------------------------------------------------------------------------------
+
+
+def _draw(results: Results) -> Figure:
+    """Score of the LIF over that of the GNM against the refractory period."""
+    figure, grid = panels(1, 2, width=WIDE, height=2.7, sharey=True)
+    for axes, start, name in zip(grid[0], STARTS, "ab", strict=True):
+        for classes, colour, mark in ((1, BLUE, "o"), (3, RED, "s")):
+            lif, gnm = ratios(results["F6"], classes, start)
+            band = np.array([
+                bootstrap(lambda a, b, k=k: float(ratio(a[:, [k]], b)[0]), lif, gnm, resamples=500)
+                for k in range(len(REFRACTORY))
+            ])  # fmt: skip
+            words = "one class" if classes == 1 else "three classes"
+            axes.fill_between(REFRACTORY, band[:, 1], band[:, 2], color=colour, alpha=0.18, lw=0)
+            axes.plot(REFRACTORY, band[:, 0], color=colour, marker=mark, ms=3, lw=1.2, label=words)
+        axes.axhline(1.0, color=INK, lw=0.9, ls="--", zorder=1)
+        axes.set(xlabel="refractory period (bins)", xlim=(-0.5, REFRACTORY[-1] + 0.5))
+        axes.set_yscale("log")
+        axes.set_yticks((0.05, 0.1, 0.2, 0.5, 1, 2, 5), minor=False)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.minorticks_off()
+        letter(axes, f"{name}   {start} initial weights")
+    grid[0, 0].set_ylabel("noisy performance, LIF / GNM")
+    grid[0, 0].legend(loc="lower left")
+    return figure
+
+
+EXPERIMENTS = {"F6": refractory}
+PICTURES = {
+    "F6": Picture(
+        _draw,
+        ("F6",),
+        "Mean score of LIF neurons over that of the GNM, by refractory period, from both kinds of "
+        "initial weights. Bands are 95 % bootstrap intervals over pattern seeds.",
+    )
+}

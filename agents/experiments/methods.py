@@ -1,0 +1,283 @@
+"""F7 and BP: neurons and learning rules side by side on two classes, on the same streams."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.experiments.design import Axis, Experiment
+from agents.experiments.figures import Picture
+from agents.experiments.statistics import by_seed, mean, median, score, wins
+from agents.experiments.training import STARTS, class_counts, learners, pattern_seeds, training
+from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
+from agents.plotting import (
+    BINS,
+    BLUE,
+    INK,
+    METHOD_COLOURS,
+    METHOD_MARKS,
+    RED,
+    WIDE,
+    letter,
+    panels,
+    silent_line,
+)
+from gnm_env import Task
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# --- the grid ------------------------------------------------------------------------------------
+
+GNM_ALL: dict[str, Any] = {"neuron": "gnm", "rule": "all"}
+GNM_ET = {"neuron": "gnm", "rule": "et"}
+GNM_ET_MODULATED = {**GNM_ET, "modulate": True}
+MST_ALL = {"neuron": "mst", "rule": "all"}
+LIF_ALL = {"neuron": "lif", "rule": "all", "refractory": 0}
+MODULATED = {"rule": "et", "modulate": True}
+
+F7_LEARNERS = {
+    "MST, ALL": MST_ALL,
+    "GNM, ALL": GNM_ALL,
+    "GNM, ET": GNM_ET,
+    "GNM, ET modulated": GNM_ET_MODULATED,
+}
+
+SEEDS = {"F7": {"quick": 10, "paper": 50}, "BP": {"quick": 4, "paper": 50}}
+
+
+def initial_weights() -> Axis:
+    """The axis of both kinds of initial weights, in one block."""
+    return Axis("start", STARTS, chunk=0, long_name="initial weights")
+
+
+def comparison(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
+    """Neurons and rules on two classes, paired by pattern seed."""
+    axes = (
+        class_counts(2),
+        pattern_seeds(seeds or range(SEEDS["F7"][size])),
+        initial_weights(),
+        learners(F7_LEARNERS),
+    )
+    return training("F7", "Neurons and learning rules, two classes", axes)
+
+
+def back_propagation(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
+    """A network with ten hidden neurons on the pattern seeds and streams of F7."""
+    axes = (class_counts(2), pattern_seeds(seeds or range(SEEDS["BP"][size])))
+    return training("BP", "Backpropagation, two classes", axes, neuron="network", rule="bp")
+
+
+# --- the claims ----------------------------------------------------------------------------------
+
+ALPHA = 0.01
+"""Level of the two-sided sign tests."""
+
+ET_FORMS = {"GNM, ET": "plain ET", "GNM, ET modulated": "modulated ET"}
+_TWO = "gnm/PatternStream-v0, 2 classes"
+
+
+def paired(results: xr.Dataset, start: str, learner: str) -> NDArray[Any]:
+    """Scores by pattern seed, two classes."""
+    return by_seed(score(results).sel(classes=2, start=start, learner=learner))
+
+
+def _judge_mst(results: Results) -> Finding:
+    def judge(start: str) -> Tried:
+        found = wins(*(paired(results["F7"], start, m) for m in ("MST, ALL", "GNM, ALL")))
+        held = found.share <= 0.16 and found.p < ALPHA
+        return Tried(held, f"{start}: MST ahead of GNM in {found}")
+
+    return from_both_starts(judge)
+
+
+def _judge_error_trace(results: Results) -> Finding:
+    held, words = {}, []
+    for learner, name in ET_FORMS.items():
+        for start in STARTS:
+            found = wins(*(paired(results["F7"], start, m) for m in (learner, "GNM, ALL")))
+            held[name, start] = found.share >= 0.8 and found.p < ALPHA
+            words.append(f"{start}: {name} ahead of ALL in {found}")
+    return Finding(
+        all(held["plain ET", start] for start in STARTS), _et_conditions(held), tuple(words)
+    )
+
+
+def _et_conditions(held: dict[tuple[str, str], bool]) -> dict[str, bool]:
+    return {f"it is {name} from {start} initial weights": holds
+            for (name, start), holds in held.items()}  # fmt: skip
+
+
+def _judge_back_propagation(results: Results) -> Finding:
+    shared = np.intersect1d(results["F7"]["pattern_seed"], results["BP"]["pattern_seed"])
+    if not shared.size:
+        return Finding(False, {}, ("no data: F7 and BP have no pattern seed in common",), False)
+    network, others = (results[name].sel(pattern_seed=shared) for name in ("BP", "F7"))
+    bp = by_seed(score(network).sel(classes=2))
+    held, words = {}, [f"BP {mean(bp):,.0f} bins"]
+    for learner, name in ET_FORMS.items():
+        for start in STARTS:
+            et = paired(others, start, learner)
+            gain = mean(bp - et)
+            held[name, start] = not gain.above(0)
+            words.append(f"{start} {name}: BP − ET {gain:+,.0f}, BP ahead in {wins(bp, et)}")
+    return Finding(all(held.values()), _et_conditions(held), tuple(words))
+
+
+_PROTOCOL = (
+    "η 0, α 0.3, τ_m 20, τ_s 5, 60,000 trials, every method on the same streams; matched and "
+    "published initial weights"
+)
+
+CLAIMS = (
+    Claim(
+        "F7a",
+        "Fig. 7",
+        "Two classes, ALL: the MST beats the GNM in 3 runs of 50",
+        _PROTOCOL,
+        "reproduced if the MST is ahead in at most 16 % of the paired seeds (8 of 50) with "
+        f"two-sided sign test p < {ALPHA:g}, from both starts; conditional on the start",
+        ("F7",),
+        _TWO,
+        _judge_mst,
+    ),
+    Claim(
+        "F7b",
+        "Fig. 7",
+        "Two classes, GNM: ET beats ALL in 46 runs of 50",
+        _PROTOCOL,
+        "reproduced if plain ET is ahead in at least 80 % of the paired seeds (40 of 50) with "
+        f"two-sided sign test p < {ALPHA:g}, from both starts; conditional on start and form of ET",
+        ("F7",),
+        _TWO,
+        _judge_error_trace,
+    ),
+    Claim(
+        "F7c",
+        "Fig. 7",
+        "Two classes: BP with 10 hidden neurons brings no benefit over ET",
+        _PROTOCOL + "; BP from its own initial weights",
+        "reproduced if the interval of the mean paired difference BP − ET does not lie above 0 "
+        "(bootstrap over seeds), for plain and modulated ET from both starts; conditional on form "
+        "and start",
+        ("F7", "BP"),
+        _TWO,
+        _judge_back_propagation,
+    ),
+)
+
+# --- the figure ----------------------------------------------------------------------------------
+
+
+def _draw(results: Results) -> Figure:
+    """Scores of all methods on two classes, seed by seed, and the paired differences."""
+    figure, grid = panels(2, 2, width=WIDE, height=5.4)
+    for column, start in enumerate(STARTS):
+        values = _by_method(results, start)
+        _points(grid[0, column], values)
+        _differences(grid[1, column], values)
+        letter(grid[0, column], f"{'ab'[column]}   {start} initial weights")
+        letter(grid[1, column], "cd"[column])
+    grid[0, 0].set_ylabel(BINS)
+    grid[1, 0].set_ylabel("paired difference (bins)")
+    for row in grid:
+        low, high = min(a.get_ylim()[0] for a in row), max(a.get_ylim()[1] for a in row)
+        for axes in row:
+            axes.set_ylim(low, high)
+    return figure
+
+
+def _by_method(results: Results, start: str) -> dict[str, tuple[NDArray[Any], NDArray[Any]]]:
+    """Seeds and scores of each method."""
+    data = results["F7"]
+    seeds = data["pattern_seed"].to_numpy()
+    values = {name: (seeds, paired(data, start, name)) for name in F7_LEARNERS}
+    if "BP" in results:
+        network = results["BP"].sel(classes=2)
+        values["BP"] = network["pattern_seed"].to_numpy(), by_seed(score(network))
+    return values
+
+
+def _points(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) -> None:
+    """One point per seed; mean with its interval, and the median as a bar."""
+    jitter = np.random.default_rng(0)
+    styles = zip(values.items(), METHOD_COLOURS, METHOD_MARKS, strict=False)
+    for place, ((_, (_, scores)), colour, mark) in enumerate(styles):
+        x = place + jitter.uniform(-0.22, 0.22, len(scores))
+        axes.plot(x, scores, mark, ms=2.8, color=colour, alpha=0.55, mew=0)
+        centre = mean(scores)
+        axes.hlines(median(scores).value, place - 0.3, place + 0.3, color=INK, lw=1.6)
+        axes.errorbar(
+            place + 0.36, centre.value, [[centre.value - centre.low], [centre.high - centre.value]],
+            fmt="D", ms=4, color=INK, mfc="white", lw=1.2,
+        )  # fmt: skip
+    axes.set_xticks(
+        range(len(values)), [name.replace(", ", "\n").replace("ulated", ".") for name in values]
+    )
+    axes.set_xlim(-0.6, len(values) - 0.4)
+    silent_line(axes, Task().silent_score)
+
+
+def _differences(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) -> None:
+    """Differences between methods on the same seed, mean with interval, and the count of wins."""
+    pairs = [
+        ("MST, ALL", "GNM, ALL"),
+        ("GNM, ET", "GNM, ALL"),
+        ("GNM, ET modulated", "GNM, ALL"),
+        ("BP", "GNM, ET"),
+        ("BP", "GNM, ET modulated"),
+    ]
+    shown = [pair for pair in pairs if pair[0] in values]
+    jitter = np.random.default_rng(0)
+    for place, (first, second) in enumerate(shown):
+        a, b = _common(values[first], values[second])
+        if not len(a):  # BP may have seeds of its own
+            continue
+        difference, found = a - b, wins(a, b)
+        x = place + jitter.uniform(-0.2, 0.2, len(difference))
+        ahead = difference > 0
+        axes.plot(x[ahead], difference[ahead], "^", ms=3, color=BLUE, alpha=0.6, mew=0)
+        axes.plot(x[~ahead], difference[~ahead], "v", ms=3, color=RED, alpha=0.6, mew=0)
+        centre = mean(difference)
+        axes.errorbar(
+            place + 0.33, centre.value, [[centre.value - centre.low], [centre.high - centre.value]],
+            fmt="D", ms=4, color=INK, mfc="white", lw=1.2,
+        )  # fmt: skip
+        axes.annotate(
+            f"{found.wins}/{found.pairs}", (place, 0.99), xycoords=("data", "axes fraction"),
+            ha="center", va="top", fontsize=7,
+        )  # fmt: skip
+    axes.axhline(0, color=INK, lw=0.9, ls="--", zorder=1)
+    labels = [f"{_short(a)}\n− {_short(b)}" for a, b in shown]
+    axes.set_xticks(range(len(shown)), labels, fontsize=6)
+    axes.set_xlim(-0.6, len(shown) - 0.4)
+    axes.margins(y=0.14)
+
+
+def _short(name: str) -> str:
+    return {"MST, ALL": "MST", "GNM, ALL": "ALL", "GNM, ET": "ET",
+            "GNM, ET modulated": "ET mod."}.get(name, name)  # fmt: skip
+
+
+def _common(
+    first: tuple[NDArray[Any], NDArray[Any]], second: tuple[NDArray[Any], NDArray[Any]]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The scores of both on the seeds that both have."""
+    _, a, b = np.intersect1d(first[0], second[0], return_indices=True)
+    return first[1][a], second[1][b]
+
+
+EXPERIMENTS = {"F7": comparison, "BP": back_propagation}
+PICTURES = {
+    "F7": Picture(
+        _draw,
+        ("F7",),
+        "Two classes. (a, b) One point per pattern seed; bars are medians, diamonds means with 95 "
+        "% bootstrap intervals; dotted is what silence scores. (c, d) Differences between two "
+        "methods on the same patterns and streams; above, how often the first was ahead.",
+    )
+}

@@ -1,0 +1,117 @@
+"""Numbers with their uncertainty.
+
+The sample is the first axis: the pattern seeds, except in F8, whose runs and trials are pooled over
+the seeds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from agents import bootstrap_interval
+
+RESAMPLES = 2_000
+
+
+class Interval(NamedTuple):
+    """An estimate with its 95 % interval; the ends are NaN where one seed leaves none."""
+
+    value: float
+    low: float
+    high: float
+
+    def __format__(self, spec: str) -> str:
+        ends = (
+            f"{self.low:{spec}} … {self.high:{spec}}" if math.isfinite(self.low) else "no interval"
+        )
+        return f"{self.value:{spec}} [{ends}]"
+
+    def below(self, bound: float) -> bool:
+        """Whether the interval, or without one the value, lies below the bound."""
+        return (self.high if math.isfinite(self.high) else self.value) < bound
+
+    def above(self, bound: float) -> bool:
+        """Whether the interval, or without one the value, lies above the bound."""
+        return (self.low if math.isfinite(self.low) else self.value) > bound
+
+
+class Wins(NamedTuple):
+    """How often one of two paired methods was ahead."""
+
+    wins: int
+    pairs: int
+    low: float
+    """Ends of the exact 95 % interval of the share of wins, ties left out …"""
+    high: float
+    p: float
+    """… and p of the two-sided sign test."""
+
+    @property
+    def share(self) -> float:
+        """Wins per pair."""
+        return self.wins / self.pairs
+
+    def __str__(self) -> str:
+        return (
+            f"{self.wins} of {self.pairs} ({self.share:.0%} [{self.low:.0%} … {self.high:.0%}], p "
+            f"= {self.p:.2g})"
+        )
+
+
+def score(results: xr.Dataset, cap: int | None = None) -> xr.DataArray:
+    """Noisy performance: bins survived, averaged over the runs; `cap` may lower the run's."""
+    survived = results["survived"]
+    return (survived if cap is None else survived.clip(max=cap)).mean("run")
+
+
+def by_seed(values: xr.DataArray) -> NDArray[np.float64]:
+    """The numbers with the pattern seeds as first axis."""
+    return values.transpose("pattern_seed", ...).to_numpy()
+
+
+def bootstrap(
+    statistic: Callable[..., Any], *samples: ArrayLike, resamples: int = RESAMPLES
+) -> Interval:
+    """`statistic` of samples that share their first axis, with its percentile bootstrap interval.
+
+    The entries along that axis are drawn again together, so that pairs stay pairs.
+    """
+    arrays = [np.asarray(sample) for sample in samples]
+    n = len(arrays[0])
+    value = float(statistic(*arrays))
+    if n < 2:
+        return Interval(value, math.nan, math.nan)
+    draws = np.random.default_rng(0).integers(0, n, (resamples, n))
+    again = [statistic(*(array[draw] for array in arrays)) for draw in draws]
+    low, high = np.percentile(again, (2.5, 97.5))
+    return Interval(value, float(low), float(high))
+
+
+def mean(sample: ArrayLike) -> Interval:
+    """The mean with its interval."""
+    values = np.asarray(sample)
+    ends = bootstrap_interval(values) if len(values) > 1 else (math.nan, math.nan)
+    return Interval(float(values.mean()), *ends)
+
+
+def median(sample: ArrayLike) -> Interval:
+    """The median with its interval."""
+    return bootstrap(np.median, sample)
+
+
+def wins(first: ArrayLike, second: ArrayLike) -> Wins:
+    """How often `first` was ahead of `second`, seed by seed."""
+    difference = np.asarray(first) - np.asarray(second)
+    ahead, decided = int(np.sum(difference > 0)), int(np.sum(difference != 0))
+    if decided == 0:
+        return Wins(0, len(difference), 0.0, 1.0, 1.0)
+    test = stats.binomtest(ahead, decided, 0.5)
+    ends = test.proportion_ci(method="exact")
+    return Wins(ahead, len(difference), float(ends.low), float(ends.high), float(test.pvalue))

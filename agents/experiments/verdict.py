@@ -1,0 +1,105 @@
+"""A claim of the paper, the rule that judges it, and what came out.
+
+Rules are fixed before the runs that they judge, and a verdict follows from the numbers alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from agents.experiments.training import STARTS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+REPRODUCED = "reproduced"
+NOT_REPRODUCED = "not reproduced"
+MISSING = "missing"
+
+Results: TypeAlias = "Mapping[str, xr.Dataset]"
+"""Finished stores by the name of their experiment."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule found.
+
+    Attributes:
+        holds: whether the claim holds as it stands, under every protocol that it was tried under.
+        conditions: what it holds under, where it does not hold as it stands.
+        numbers: ours with their intervals, in words.
+        judged: False where the stores are there and yet leave nothing to compare.
+    """
+
+    holds: bool
+    conditions: Mapping[str, bool]
+    numbers: tuple[str, ...]
+    judged: bool = True
+
+    @property
+    def verdict(self) -> str:
+        """Reproduced, reproduced if …, not reproduced, or missing."""
+        if not self.judged:
+            return MISSING
+        if self.holds:
+            return REPRODUCED
+        kept = [condition for condition, holds in self.conditions.items() if holds]
+        return f"{REPRODUCED} if {', or '.join(kept)}" if kept else NOT_REPRODUCED
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the report.
+
+    Attributes:
+        id: such as "F7b".
+        where: in the paper.
+        words: what the paper says.
+        protocol: what we ran.
+        rule: when it counts as reproduced, in words.
+        needs: experiments whose stores the rule reads.
+        environment: the task.
+        judge: the rule.
+    """
+
+    id: str
+    where: str
+    words: str
+    protocol: str
+    rule: str
+    needs: tuple[str, ...]
+    environment: str
+    judge: Callable[[Results], Finding]
+
+    def finding(self, results: Results) -> Finding | None:
+        """What the rule finds; None if a store that it needs is not there."""
+        return self.judge(results) if all(name in results for name in self.needs) else None
+
+
+class Tried(NamedTuple):
+    """What a rule found from one kind of initial weights: whether the claim holds, ours in words,
+    and whether a weaker form of it does."""
+
+    holds: bool
+    words: str
+    weaker: bool = False
+
+
+def from_both_starts(judge: Callable[[str], Tried], weaker: str = "") -> Finding:
+    """The finding of a rule that `judge` tries from each kind of initial weights.
+
+    The start is a condition, and so is the weaker form (named by `weaker`) where the claim itself
+    does not hold.
+    """
+    tried = {start: judge(start) for start in STARTS}
+    conditions = {f"the initial weights are the {s} ones": one.holds for s, one in tried.items()}
+    if weaker:
+        conditions |= {
+            f"{weaker} ({start} initial weights)": one.weaker and not one.holds
+            for start, one in tried.items()
+        }
+    return Finding(
+        all(one.holds for one in tried.values()), conditions, tuple(t.words for t in tried.values())
+    )

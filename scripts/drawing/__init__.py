@@ -1,1 +1,0 @@
-"""Pictures of results. Nothing here trains; each function reads finished stores."""

@@ -1,0 +1,98 @@
+"""What is kept of a report: the claims as a page, the figures, and stores that can be unpacked."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+from agents.commands import publish
+from agents.commands.terminal import parse
+from agents.experiments.journal import StoreError
+from agents.experiments.store import read
+from agents.experiments.sweep import sweep
+from agents.experiments.workers import threads
+from tests.agents.experiments.toys import toy
+
+CLAIM = {
+    "id": "F3a",
+    "words": "a | b",
+    "numbers": ["one", "two"],
+    "verdict": "reproduced",
+}
+STORE = {"name": "toy", "blocks": 18, "wall": "2 s", "work": "3 s", "commits": "0123456789"}
+
+
+@pytest.fixture
+def places(tmp_path: Path) -> list[str]:
+    """Options for a report with one claim, one figure and one finished store."""
+    report = tmp_path / "report"
+    (report / "figures").mkdir(parents=True)
+    for suffix in ("png", "pdf", "svg"):
+        (report / "figures" / f"F3.{suffix}").write_text(suffix)
+    record = {"size": "quick", "claims": [CLAIM], "stores": [STORE]}
+    (report / "claims.json").write_text(json.dumps(record))
+    with threads(1) as executor:
+        sweep(toy(), tmp_path / "results" / "toy", executor)
+    return ["--report", str(report), "--results", str(tmp_path / "results"),
+            "--out", str(tmp_path / "docs")]  # fmt: skip
+
+
+def run(places: list[str], *more: str) -> dict[str, Any]:
+    return publish.main(parse(publish, [*places, *more]))
+
+
+def test_claims_and_figures_are_kept(places: list[str], tmp_path: Path) -> None:
+    run(places)
+    kept = sorted(str(p.relative_to(tmp_path / "docs")) for p in tmp_path.glob("docs/**/*.*"))
+    assert kept == [
+        "quick/claims.json",
+        "quick/claims.md",
+        "quick/figures/F3.pdf",
+        "quick/figures/F3.png",
+    ]
+    text = (tmp_path / "docs" / "quick" / "claims.md").read_text()
+    assert "| F3a | a \\| b | one<br>two | **reproduced** |" in text
+    assert "| toy | 18 | 2 s | 3 s | 0123456789 |" in text
+
+
+def test_an_unpacked_store_is_the_store_that_it_was(places: list[str], tmp_path: Path) -> None:
+    (archive,) = run(places, "--stores")["stores"]
+    with zipfile.ZipFile(archive) as file:
+        file.extractall(tmp_path / "again")
+    xr.testing.assert_identical(read(tmp_path / "again"), read(tmp_path / "results" / "toy"))
+
+
+def test_a_new_report_leaves_nothing_of_the_old_one(places: list[str], tmp_path: Path) -> None:
+    old = tmp_path / "docs" / "quick" / "figures" / "F9.png"
+    old.parent.mkdir(parents=True)
+    old.touch()
+    run(places)
+    assert not old.exists()
+
+
+def test_what_is_not_there_or_damaged_is_refused(places: list[str], tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="is a report of size 'quick', not 'paper'"):
+        run(places, "--size", "paper")
+    with pytest.raises(ValueError, match=r"there is no report .* run gnm reproduce first"):
+        run([*places, "--report", str(tmp_path)])
+    chunk = max((tmp_path / "results" / "toy").rglob("c/**/*"), key=lambda p: p.is_file())
+    chunk.write_bytes(b"nonsense")
+    with pytest.raises(StoreError, match="damaged"):
+        run(places, "--stores")
+
+
+def test_what_is_kept_stays_whole_if_a_store_is_missing(places: list[str], tmp_path: Path) -> None:
+    run(places, "--stores")
+    kept = {path: path.read_bytes() for path in tmp_path.glob("docs/**/*.*")}
+    (tmp_path / "results" / "toy").rename(tmp_path / "elsewhere")
+
+    with pytest.raises(StoreError, match="there is no store"):
+        run(places, "--stores")
+
+    assert {path: path.read_bytes() for path in tmp_path.glob("docs/**/*.*")} == kept
+    assert [path.name for path in (tmp_path / "docs").iterdir()] == ["quick"]

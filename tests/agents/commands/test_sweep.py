@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+from agents.commands.terminal import pattern_seeds
+from agents.experiments.design import Block
+from agents.experiments.journal import DATA
+from agents.experiments.store import read, summarise
+from agents.experiments.sweep import sweep
+from agents.experiments.workers import cluster, threads
+from tests.agents.experiments.toys import toy, work
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def run(folder: Path, **settings: Any) -> xr.Dataset:
+    with threads(2) as executor:
+        sweep(toy(**settings), folder, executor)
+    return read(folder)
+
+
+def script(name: str, *arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / name), *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, cwd=cwd,
+    )  # fmt: skip
+
+
+def test_a_finished_sweep_computes_nothing_again(tmp_path: Path) -> None:
+    first = run(tmp_path / "toy")
+
+    def never(block: Block) -> dict[str, Any]:
+        raise AssertionError(f"computed block {block.number} again")
+
+    xr.testing.assert_identical(run(tmp_path / "toy", compute=never), first)
+
+
+def helper(name: str, *arguments: object) -> dict[str, Any]:
+    """Run one of the programs beside this file; its last line is what it has to tell."""
+    ended = subprocess.run(
+        [sys.executable, "-m", f"tests.agents.experiments.{name}", *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    told: dict[str, Any] = json.loads(ended.stdout.splitlines()[-1])
+    return told
+
+
+def test_a_sweep_killed_at_ten_random_moments_ends_with_the_same_values(tmp_path: Path) -> None:
+    folder = tmp_path / "toy"
+    told = helper("killed_sweep", folder)
+    assert told["ends"] == [signal.SIGKILL] * 10
+    assert told["done"] == sorted(told["done"])
+    assert 0 < told["done"][-1] < 216, "kills should meet a sweep at work"
+
+    survivor = run(folder, seeds=36, pause=0.04)
+
+    xr.testing.assert_identical(survivor, run(tmp_path / "whole", seeds=36, pause=0.04))
+    assert summarise(folder).done == summarise(folder).blocks == 216
+    assert not list((folder / DATA).rglob("*.partial"))
+
+
+def test_a_block_that_fails_costs_no_finished_block(tmp_path: Path) -> None:
+    def fails_late(block: Block) -> dict[str, Any]:
+        if block.number == 9:
+            time.sleep(0.2)
+            raise ValueError("block 9 has no answer")
+        return work(block)
+
+    with pytest.raises(ValueError, match="block 9 has no answer"):
+        run(tmp_path / "toy", compute=fails_late)
+    assert 0 < summarise(tmp_path / "toy").done < 18
+    run(tmp_path / "toy")
+
+
+class KilledWorker(Exception):
+    """As Dask raises it."""
+
+    __module__ = "distributed.scheduler"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (
+            CancelledError(),
+            r"a worker or the scheduler was lost \(CancelledError\) while computing",
+        ),
+        (KilledWorker("at\nlength"), r"a worker or the scheduler was lost \(KilledWorker\) while"),
+        (BrokenProcessPool(), r"a worker or the scheduler was lost \(BrokenProcessPool\) while"),
+        (TimeoutError(), r"a worker or the scheduler was lost \(TimeoutError\) while computing"),
+        (OSError(24, "Too many open files"), "Too many open files while computing classes 2, patt"),
+    ],
+)
+def test_what_goes_wrong_with_a_block_is_not_said_of_writing(
+    tmp_path: Path, error: Exception, told: str
+) -> None:
+    def fails(block: Block) -> dict[str, Any]:
+        if block.number == 9:
+            time.sleep(0.2)
+            raise error
+        return work(block)
+
+    with pytest.raises(
+        OSError, match=told + r".*; \d+ of 18 blocks are kept: .*run it again"
+    ) as info:
+        run(tmp_path / "toy", compute=fails)
+    assert "make room" not in str(info.value)
+    assert len(str(info.value).splitlines()) == 1
+
+
+def test_a_full_disk_is_one_line_with_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(tmp_path / "whole")
+    put, calls = sys.modules["zarr.storage._local"]._put, []
+
+    def nearly_full(path: Path, *arguments: Any, **options: Any) -> Any:
+        calls.append(path)
+        if "/c/" in str(path) and "survived" in str(path) and len(calls) > 20:
+            raise OSError(28, "No space left on device")
+        return put(path, *arguments, **options)
+
+    monkeypatch.setattr("zarr.storage._local._put", nearly_full)
+    kept = r"No space left on device while writing .*toy; \d+ of 18 blocks are kept"
+    with pytest.raises(OSError, match=kept):
+        run(tmp_path / "toy")
+    monkeypatch.undo()
+    xr.testing.assert_identical(run(tmp_path / "toy"), read(tmp_path / "whole"))
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds"), [("3", (0, 1, 2)), ("3,5,8", (3, 5, 8)), ("4-6", (4, 5, 6))]
+)
+def test_seeds_are_a_number_a_list_or_a_range(text: str, seeds: tuple[int, ...]) -> None:
+    assert pattern_seeds(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["0-99999999999", "99999999999", "8999-9000", "3,9000"])
+def test_seeds_beyond_the_last_are_refused_before_they_are_listed(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match=r"must be in 0 … 8999, got"):
+        pattern_seeds(text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["F99"], "there is no experiment 'F99': choose one of F1, F2"),
+        (["F1", "--store", "/proc/nowhere/F1"], "cannot write in /proc/nowhere (No such file"),
+        (["F1", "--threads", "0"], "--threads: must be >= 1, got 0"),
+        (["F1", "--seeds", "3"], "F1 has no pattern seeds: leave --seeds out"),
+    ],
+)
+def test_bad_input_ends_with_one_line_and_code_2(
+    tmp_path: Path, arguments: list[str], complaint: str
+) -> None:
+    ended = script("sweep.py", *arguments, cwd=tmp_path)
+
+    assert ended.returncode == 2
+    assert complaint in ended.stderr
+    assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+
+
+def test_a_script_ends_with_one_json_object_and_a_line_of_progress(tmp_path: Path) -> None:
+    ended = script("sweep.py", "F1", "--json", cwd=tmp_path)
+
+    assert ended.returncode == 0, ended.stderr
+    summary = json.loads(ended.stdout.splitlines()[-1])
+    assert (summary["experiment"], summary["done"], summary["blocks"]) == ("F1", 2, 2)
+    assert ended.stderr == "F1: 2/2 blocks, 0 s\n" or ended.stderr.startswith("F1: 2/2 blocks, ")
+    assert read(tmp_path / "results" / "quick" / "F1").sizes["bin"] == 200
+
+
+def test_without_an_extra_a_script_says_in_one_line_which(tmp_path: Path) -> None:
+    (tmp_path / "zarr.py").write_text("raise ModuleNotFoundError(name='zarr')")
+    ended = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "sweep.py"), "F1"],
+        capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+
+    assert ended.returncode == 2
+    assert ended.stderr == 'sweep.py: zarr is not installed: pip install "gnm-env[reproduce]"\n'
+
+
+@pytest.fixture
+def nowhere() -> str:
+    """The address of a scheduler that is not there."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tcp://127.0.0.1:{free.getsockname()[1]}"
+
+
+def test_a_scheduler_that_is_not_there_is_refused(
+    nowhere: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("agents.experiments.workers.CONNECTION_SECONDS", 0.3)
+
+    with (
+        pytest.raises(ValueError, match=f"no Dask scheduler answers at {nowhere} .*: start one"),
+        cluster(nowhere),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(
+    tmp_path: Path, nowhere: str
+) -> None:
+    started = time.monotonic()
+    ended = script("sweep.py", "F1", "--scheduler", nowhere, cwd=tmp_path)
+
+    assert time.monotonic() - started < 10
+    assert ended.returncode == 2
+    assert ended.stderr.startswith(f"sweep.py: no Dask scheduler answers at {nowhere}")
+    assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+
+
+@pytest.mark.slow
+def test_a_dask_worker_that_dies_costs_its_block_only(tmp_path: Path) -> None:
+    told = helper("dying_worker", tmp_path / "toy")
+
+    assert told["killed"] in told["workers"]
+    assert told["killed"] not in told["workers_at_the_end"]
+    assert told["computed"] - 18 in (0, 1), "only the block at which the worker died is done twice"
+    xr.testing.assert_identical(read(tmp_path / "toy"), run(tmp_path / "whole", pause=0.2))
