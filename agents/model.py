@@ -22,6 +22,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from agents import registry
+
 Block = NDArray[np.float64]
 """WIDTH models side by side: (rows, WIDTH); of many blocks, (blocks, rows, WIDTH)."""
 
@@ -74,6 +76,13 @@ class Model(ABC):
     """Whether the output of a bin is an amount instead of a spike."""
     widest: ClassVar[int] = 32
     """Most models side by side in one block: with more, what they work on leaves the cache."""
+
+    kind: ClassVar[str] = "neuron"
+    """Where it is registered: see `agents.registry`."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        registry.register(cls.kind, cls, ("step", "advance", "compiled_step"))
 
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from agents import registry
 from agents.learning.rule import Rule, decay_option
 from agents.model import Model, PSPKernel
 from agents.network.backpropagation import RuleNumbers, backpropagated_change
@@ -59,10 +58,7 @@ class Network(Model):
     parameters_type: ClassVar[type] = NetworkParams
     state_type: ClassVar[type] = State
     widest: ClassVar[int] = 8
-
-    def __init_subclass__(cls, **keywords: Any) -> None:
-        super().__init_subclass__(**keywords)
-        registry.register("network", cls, ("advance",))
+    kind: ClassVar[str] = "network"
 
     def __post_init__(self) -> None:
         if self.hidden is not None:

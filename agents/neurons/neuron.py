@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
-from agents import registry
 from agents.model import Arrays, Model, PSPKernel, Response
 from agents.portable import portable
 from agents.simd import like, load
@@ -75,7 +74,6 @@ class Neuron(Model):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        registry.register("neuron", cls, ("step", "advance", "compiled_step"))
         if "step" in vars(cls):
             cls._compiled = (cls.name, portable(cls.step))
 

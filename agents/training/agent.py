@@ -52,7 +52,8 @@ class Agent:
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        registry.register("agent", cls)
+        if "name" in vars(cls):  # others serve well, but cannot be saved
+            registry.register("agent", cls)
 
     def __init__(
         self,
@@ -245,6 +246,8 @@ class Agent:
         feedback = self._rule.feedback
         if not isinstance(reward, numbers.Real) or not math.isfinite(reward):
             raise ValueError(f"reward must be a finite number, got {reward!r}")
+        if sign_only and feedback == "sign":
+            return whole_trial(self._bin, told=float(np.sign(reward)))
         assert self._heard is not None
         given = float(self._heard.output[: self._bin].sum())
         if "emitted" in info and abs(float(info["emitted"]) - given) > 1e-6 * max(1.0, given):
@@ -258,13 +261,11 @@ class Agent:
         if feedback == "none":
             return whole_trial(self._bin, told=1.0)
         if sign_only:
-            if feedback != "sign":
-                raise ValueError(
-                    f"{type(self._rule).__name__} needs to know {FEEDBACK[feedback]}, and this "
-                    'environment tells the sign of the error only: use feedback="cost", or a rule '
-                    "such as AggregateLabel or CriticalThreshold"
-                )
-            return whole_trial(self._bin, told=float(np.sign(reward)))
+            raise ValueError(
+                f"{type(self._rule).__name__} needs to know {FEEDBACK[feedback]}, and this "
+                'environment tells the sign of the error only: use feedback="cost", or a rule '
+                "such as AggregateLabel or CriticalThreshold"
+            )
         return segments_told(self._bin, info, feedback == "presentations", type(self._rule))
 
     def _make_room(self, bins: int, events: int) -> None:

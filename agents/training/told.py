@@ -84,8 +84,8 @@ def _whole(name: str, value: Any) -> int:
         number = operator.index(value)
     except TypeError:
         raise ValueError(f"{name} must be a whole number, got {value!r}") from None
-    if not 0 <= number < 2**53:
-        raise ValueError(f"{name} must be in 0 … 2**53, got {number}")
+    if abs(number) >= 2**53:
+        raise ValueError(f"{name} must be in −2**53 … 2**53, got {number}")
     return number
 
 

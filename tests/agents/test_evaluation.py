@@ -147,12 +147,12 @@ def test_a_list_of_one_is_still_a_list() -> None:
 
 def test_scoring_changes_nothing() -> None:
     agent = easy_agent()
-    agent.momentum[:] = 0.5
+    agent.velocity[:] = 0.5
     weights = agent.weights.copy()
     noisy_performance(agent, EASY, EASY_PATTERNS, 3, CAP)
     answers(agent, EASY, EASY_PATTERNS, trials=5)
     assert np.array_equal(agent.weights, weights)
-    assert (agent.momentum == 0.5).all()
+    assert (agent.velocity == 0.5).all()
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_answers_are_those_that_recording_the_same_trials_shows() -> None:
     table, false_alarms, wrong, occurrences = counted_by_recording(agent)
     assert np.array_equal(result.table[0], table)
     assert result.table.sum(axis=2).tolist() == [occurrences]
-    assert result.false_alarms.tolist() == [false_alarms]
+    assert result.false_positives.tolist() == [false_alarms]
     assert result.wrong.tolist() == [wrong]
     assert result.trials == TRIALS
     assert result.noise_bins == TRIALS * BUSY.background_bins
@@ -225,7 +225,7 @@ def test_answers_of_several_agents_stand_in_their_order_whatever_their_kinds() -
     for b, agent in enumerate(agents):
         table, false_alarms, wrong, _ = counted_by_recording(agent)
         assert np.array_equal(result.table[b], table), b
-        assert result.false_alarms[b] == false_alarms
+        assert result.false_positives[b] == false_alarms
         assert result.wrong[b] == wrong
 
 

@@ -24,7 +24,7 @@ def test_however_feedback_is_given_aggregate_labels_teach_the_same(feedback: str
     train(usual, trial_env(), 50, seed=4)
     train(other, trial_env(feedback=feedback), 50, seed=4)
     assert np.array_equal(usual.weights, other.weights)
-    assert np.array_equal(usual.momentum, other.momentum)
+    assert np.array_equal(usual.velocity, other.velocity)
 
 
 def test_environments_may_be_wrapped() -> None:

@@ -103,7 +103,7 @@ def alone(neuron: str, rule: str, lane: int = 0, seed: int = 9) -> tuple[NeuronA
 
 def assert_same(one: NeuronAgent, other: NeuronAgent) -> None:
     assert np.array_equal(one.weights, other.weights)
-    assert np.array_equal(one.momentum, other.momentum)
+    assert np.array_equal(one.velocity, other.velocity)
     assert one.overflowed == other.overflowed
 
 

@@ -83,7 +83,7 @@ def test_resumed_training_ends_as_an_uninterrupted_one(tmp_path: Path) -> None:
     trained(tmp_path / "rest", "--trials", "100", "--resume", checkpoint)
     whole, rest = (load_checkpoint(tmp_path / x / "agent.npz") for x in ("whole", "rest"))
     assert np.array_equal(whole.agent.weights, rest.agent.weights)
-    assert np.array_equal(whole.agent.momentum, rest.agent.momentum)
+    assert np.array_equal(whole.agent.velocity, rest.agent.velocity)
 
 
 def test_interrupted_training_saves_what_there_is(

@@ -57,7 +57,7 @@ def test_the_loop_and_the_compiled_trainer_end_with_the_same_bits(rule: Rule, et
     slow = train(looped, graded(), trials=12, seed=3)
     fast = train_many(others, TASK, PATTERNS, trials=12, seed=3)
     assert np.array_equal(looped.weights, others[1].weights)
-    assert np.array_equal(looped.momentum, others[1].momentum)
+    assert np.array_equal(looped.velocity, others[1].velocity)
     assert not np.array_equal(looped.weights, make(rule, eta=eta).weights)
     np.testing.assert_allclose(slow.mean_error, fast.mean_error[:, 1], rtol=1e-12)
     assert slow.error_rate.tolist() == fast.error_rate[:, 1].tolist()

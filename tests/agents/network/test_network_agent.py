@@ -48,7 +48,7 @@ def alone(lane: int = 0, hidden: int | None = 4) -> tuple[NetworkAgent, History]
 
 def assert_same(one: NetworkAgent, other: NetworkAgent) -> None:
     assert np.array_equal(one.weights, other.weights)
-    assert np.array_equal(one.momentum, other.momentum)
+    assert np.array_equal(one.velocity, other.velocity)
     assert one.overflowed == other.overflowed
 
 
