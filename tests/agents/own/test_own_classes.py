@@ -202,6 +202,6 @@ def test_the_command_line_takes_them(tmp_path: Path) -> None:
     ]  # fmt: skip
     ended = subprocess.run(command, cwd=HERE, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr[-2000:]
-    saved = load_checkpoint(json.loads(ended.stdout.splitlines()[-1])["agent"]).agent
+    saved = load_checkpoint(json.loads(ended.stdout.splitlines()[-1])["checkpoint"]).agent
     assert (type(saved.neuron), type(saved.rule)) == (ALIF, Tempotron)
     assert saved.neuron.alpha == 0.2
