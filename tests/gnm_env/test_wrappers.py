@@ -228,7 +228,7 @@ def test_environments_that_cannot_be_wrapped_are_refused_with_a_reason():
         RisingEdge(gym.make(TRIAL, output="graded"))
     with pytest.raises(ValueError, match="seed must be a whole number"):
         SeededEpisodes(gym.make(STREAM), seed=0.5)
-    with pytest.raises(ValueError, match="action must be 0 .silent. or 1"):
+    with pytest.raises(ValueError, match=r"action must be 0 .silent. or 1"):
         env = RisingEdge(gym.make(STREAM))
         env.reset()
         env.step(2)
