@@ -109,7 +109,7 @@ def improve(policy: Policy, optimiser: torch.optim.Optimizer, rollout: dict[str,
             loss = VALUE * (value - batch["return"]).square().mean() - gain
             loss = loss - ENTROPY * answers.entropy().mean()
             optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             nn.utils.clip_grad_norm_(policy.parameters(), MAX_NORM)
             optimiser.step()
 
