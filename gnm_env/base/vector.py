@@ -275,8 +275,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     # Reset and step
 
     @staticmethod
-    def _busy() -> RuntimeError:
-        return RuntimeError(
+    def _busy() -> ValueError:
+        return ValueError(
             "another thread is stepping, resetting or copying these environments: let one thread "
             "do it, or give each thread environments of its own"
         )
@@ -344,7 +344,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
         """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
-        checked = np.asarray(actions)
+        checked = array_of(actions)
         if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
             raise ValueError(
                 f"actions must be whole numbers of shape ({self.num_envs},), one per environment, "
@@ -387,6 +387,14 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             "final_info": terminal,
             "_final_info": mask.copy(),
         }
+
+
+def array_of(actions: Any) -> NDArray[Any]:
+    """`actions` as an array; an empty one where they are none."""
+    try:
+        return np.asarray(actions)
+    except (TypeError, ValueError):  # ragged lists
+        return np.empty(0, object)
 
 
 def read_only(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

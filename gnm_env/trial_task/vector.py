@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gnm_env.base.kernels import COST, DENSE, SIGN, Config, Episodes, Growing, growing_of
 from gnm_env.base.params import VectorParams, from_keywords, signature
-from gnm_env.base.vector import PatternVectorEnv, Step, read_only
+from gnm_env.base.vector import PatternVectorEnv, Step, array_of, read_only
 from gnm_env.checks import require_memory
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
@@ -145,7 +145,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
-        checked = np.asarray(actions)
+        checked = array_of(actions)
         if checked.shape != (self.num_envs, 1) or checked.dtype.kind not in "fiub":
             raise ValueError(
                 f"actions must be numbers of shape ({self.num_envs}, 1), one per environment, "
