@@ -126,3 +126,14 @@ class Model(ABC):
     def psp_kernel(self) -> PSPKernel | None:
         """The presynaptic trace; None for a model whose potential is not linear in its inputs."""
         return None
+
+
+def threshold_name(parameters: Any) -> str:
+    """The name of the readout's threshold among the parameters of a neuron."""
+    for name in ("theta_r", "theta"):
+        if name in parameters._fields:
+            return name
+    raise ValueError(
+        f"the parameters of a neuron must hold its threshold under the name theta or theta_r, "
+        f"got {', '.join(parameters._fields)}"
+    )

@@ -61,7 +61,7 @@ def inlined(function: Callable[..., Any]) -> Any:
     For what is called so often that the call itself costs something: numba counts references to
     each array that is handed over, and hands over a tuple field by field.
     """
-    return _dispatcher(function, forceinline=True)
+    return _dispatcher(function, inline="always")
 
 
 def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:

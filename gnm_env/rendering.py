@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,9 +95,10 @@ class Scroll:
         shade = WHITE if now is None or now.class_ < 0 else tint(class_colour(now.class_))
         given, owed = (output, 0) if now is None else (now.given, now.owed)
         wrong = output > 0 and too_many(given, owed)
-        new = (obs_row, shade, output, wrong, potential)
+        new: tuple[Any, ...] = (obs_row, shade, output, wrong, potential)
         histories = (self._inputs, self._tints, self._outputs, self._wrong, self._potentials)
-        for history, value in zip(histories, new, strict=True):
+        pairs: Any = zip(histories, new, strict=True)
+        for history, value in pairs:
             history[:-1] = history[1:]
             history[-1] = value
         self._n_bins += 1

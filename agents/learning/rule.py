@@ -29,7 +29,7 @@ from agents.model import Model, PSPKernel
 from agents.portable import portable
 from agents.simd import like, load, store, where
 from gnm_env.checks import real, whole
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 
 FEEDBACK: Mapping[str, str] = {
     "sign": "whether the sum of the output spikes was too small or too large",
@@ -69,7 +69,7 @@ class RuleParameters(NamedTuple):
     """Fraction of the learning rate that each trial takes away; 0 for a constant rate."""
 
 
-@compiled
+@inlined
 def sign_of_error(outcome: Outcome) -> Any:
     """+1 where more output was owed, −1 where less, 0 where the sum was right."""
     zero = like(0.0, outcome.emitted)
@@ -78,19 +78,19 @@ def sign_of_error(outcome: Outcome) -> Any:
     )
 
 
-@compiled
+@inlined
 def whole_error(outcome: Outcome) -> Any:
     """Output missing in the trial, negative where there was too much."""
     return outcome.label - outcome.emitted
 
 
-@compiled
+@inlined
 def any_error(outcome: Outcome) -> Any:
     """1 where the error trace is anything but zero."""
     return where(outcome.has_error, 1.0, like(0.0, outcome.emitted))
 
 
-@compiled
+@inlined
 def always(outcome: Outcome) -> Any:
     """1: every trial teaches."""
     return like(1.0, outcome.emitted)
@@ -106,7 +106,7 @@ CORRECTIONS: Mapping[str, Any] = {
 """correction(outcome) -> c by feedback: 0 where a trial teaches nothing, else what it tells."""
 
 
-@compiled
+@inlined
 def in_proportion(p: RuleParameters, static: Any, c: Any, eligibility: Any) -> None:
     """Δ_i = λ ε_i, in place."""
     for i in range(len(eligibility)):

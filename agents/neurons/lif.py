@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
 from gnm_env.checks import real, whole
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 
 
 class Parameters(NamedTuple):
@@ -23,7 +23,7 @@ class State(NamedTuple):
     """Bins left whose input is ignored."""
 
 
-@compiled
+@inlined
 def step(
     p: Parameters, static: tuple[int, ...], state: State, current: Any
 ) -> tuple[State, Response]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
-from agents.model import Arrays, Model, PSPKernel, Response
+from agents.model import Arrays, Model, PSPKernel, Response, threshold_name
 from agents.portable import portable
 from agents.simd import like, load
 from gnm_env.compiled import inlined, specialise
@@ -80,6 +80,11 @@ class Neuron(Model):
     def parameters(self) -> tuple[float, ...]:
         """The fields of the dataclass, in order; a neuron that needs other numbers overrides it."""
         return tuple(float(getattr(self, name)) for name in self.parameters_type._fields)
+
+    @property
+    def threshold(self) -> float:
+        """The parameter theta_r or theta; a neuron with another name for it overrides this."""
+        return float(getattr(self, threshold_name(self.parameters_type)))
 
     def compiled_step(self) -> tuple[str, Any]:
         """The step, compiled, and a name that tells it from every other."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +20,7 @@ from agents.model import Arrays, Model
 from agents.recording import Recording
 from agents.training.batch import AgentBatch
 from agents.training.binding import loops, recorder
+from agents.training.compile_errors import explained
 from agents.training.source import Source
 from agents.training.stepwise import Heard
 from agents.training.streams import WRONG_BEYOND
@@ -208,7 +210,10 @@ class Agent:
     def _step(self, obs: NDArray[Any]) -> float:
         row = self._checked(obs, (self._n_inputs,))
         assert self._heard is not None
-        out: float = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        try:
+            out: float = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        except NumbaError as error:
+            raise explained(error, self._model) from None
         if out < 0.0:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
             out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
@@ -236,9 +241,12 @@ class Agent:
         left = 1.0 - float(self._trials - 1) * decay
         rate = self.rule_parameters()[0] * max(left, 0.0)
         trial = told.arrays(self._heard.channels, self._heard.offsets[: self._bin + 1])
-        outcome = self._loops.update(
-            self._rule_block, self._block, trial, self._heard, told.told, told.label, rate
-        )
+        try:
+            outcome = self._loops.update(
+                self._rule_block, self._block, trial, self._heard, told.told, told.label, rate
+            )
+        except NumbaError as error:
+            raise explained(error, self._model, self._rule) from None
         self.overflowed = outcome < 0
 
     def _told(self, reward: float, info: Mapping[str, Any], sign_only: bool) -> Told:
@@ -330,7 +338,10 @@ class Agent:
             np.empty((self._model.n_notes, 1)),
         )  # fmt: skip
         block = ModelBlock(self._block.parameters, arrays, self._block.static, self._block.n_notes)
-        values, given, memory = recorder(self._model)(block, trial.arrays)
+        try:
+            values, given, memory = recorder(self._model)(block, trial.arrays)
+        except NumbaError as error:
+            raise explained(error, self._model) from None
         return self._recording(values, given, memory)
 
     def _recording(

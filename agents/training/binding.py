@@ -8,9 +8,8 @@ from typing import Any
 
 from agents.learning.rule import CORRECTIONS, Rule
 from agents.learning.teaching import replay_template
-from agents.model import Model
+from agents.model import Model, threshold_name
 from agents.training import change
-from agents.training.batches import draw_batch, take_batch
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
     predict_template,
@@ -29,9 +28,6 @@ from agents.training.trial import (
     spikes_of,
 )
 from gnm_env.compiled import specialise
-
-SOURCES: dict[str, Any] = {"task": draw_batch, "data": take_batch}
-"""What fills a batch with trials, by the kind of source."""
 
 
 def loops(model: Model, rule: Rule, width: int = 1) -> Any:
@@ -64,24 +60,21 @@ def _loops(
     alone = f"{label}_{width}"
     together = f"{label}_{rule.name}_{'bi' if biexponential else 'mono'}_{width}"
     flags = {name: of_rule[name] for name in ("USES_ERROR", "USES_OUTPUT")}
-    bins = specialise(run_bins_template, together, **of_model, **flags)
-    trial = specialise(run_trial_template, together, **of_model, run_bins=bins)
+    bins = specialise(run_bins_template, together, inline=True, **of_model, **flags)
+    trial = specialise(run_trial_template, together, inline=True, **of_model, run_bins=bins)
     compute_change = _change(label, of_model, of_rule, rule, together)
-    learn = specialise(learn_trial_template, together, **of_rule, compute_change=compute_change)
+    learn = specialise(
+        learn_trial_template, together, inline=True, **of_rule, compute_change=compute_change
+    )
     everything = {**of_model, **of_rule, "run_trial": trial, "learn_trial": learn}
-    made = SimpleNamespace(
+    return SimpleNamespace(
+        train=specialise(train_template, together, **everything),
+        answer=specialise(answer_template, together, **everything),
         update=specialise(update_template, together, **everything),
         survive=specialise(survive_template, alone, **of_model),
         step=specialise(step_template, alone, **of_model),
         predict=specialise(predict_template, alone, **of_model),
     )
-    for source, fill_batch in SOURCES.items():
-        names = {**everything, "fill_batch": fill_batch}
-        train = specialise(train_template, f"{together}_{source}", **names)
-        answer = specialise(answer_template, f"{together}_{source}", **names)
-        setattr(made, f"train_{source}", train)
-        setattr(made, f"answer_{source}", answer)
-    return made
 
 
 def _of_model(advance: Any, model: type[Model], width: int) -> dict[str, Any]:
@@ -115,8 +108,10 @@ def _change(
         return specialise(rule.block_change, together, **of_rule)
     if rule.teaching_signal is not None:
         names = {**of_rule, **rule.compiled_pointwise()}
-        sums = specialise(change.sum_eligibility_template, together, **names)
-        return specialise(change.pointwise_change_template, together, **names, sum_eligibility=sums)
+        sums = specialise(change.sum_eligibility_template, together, inline=True, **names)
+        return specialise(
+            change.pointwise_change_template, together, inline=True, **names, sum_eligibility=sums
+        )
     numbers = of_model["Parameters"]
     names = {**of_model, **of_rule, "WIDTH": 1, "OwnNumbers": rule.parameters_type}
     names["THRESHOLD"] = numbers._fields.index(threshold_name(numbers))
@@ -126,14 +121,3 @@ def _change(
     epsilon = specialise(change.epsilon_template, alone, **names, teach=own) if rule.teach else own
     learn_alone = specialise(change.learn_alone_template, alone, **names, epsilon=epsilon)
     return specialise(change.taught_change_template, together, **of_rule, learn_alone=learn_alone)
-
-
-def threshold_name(parameters: Any) -> str:
-    """The name of the readout's threshold among the parameters of a neuron."""
-    for name in ("theta_r", "theta"):
-        if name in parameters._fields:
-            return name
-    raise ValueError(
-        f"the parameters of a neuron must hold its threshold under the name theta or theta_r, "
-        f"got {', '.join(parameters._fields)}"
-    )

@@ -112,8 +112,10 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self._outcome = OutcomeArrays(
             done=np.zeros(n, np.int64),
             results=self._new_results(),
-            heads=np.zeros((n, 6), np.int64),
+            heads=np.zeros((n, 5), np.int64),
         )
+        # What is asked for at every step, at hand.
+        self._observations, self._results = self._display.observations, self._outcome.results
         self._counters = StepCounters(*np.zeros((4, n), np.uint32))
         self._n_done = 0
         self._generators: Generators | None = None
@@ -143,6 +145,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             most=1.0,
             feedback=COST,
             tolerance=0.0,
+            tells_ends=False,
             shift=event_shift(self._n_inputs),
         )
 
@@ -151,9 +154,9 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         n = self.num_envs
         return Growing(
             events=np.zeros((n, 8), self._event_type()),
-            edges=np.zeros((n, 18), np.int64),
-            target=np.zeros((n, 17), np.int64),
-            classes=np.zeros((n, 8), np.int64),
+            presentations=np.zeros((n, 8), np.int64),
+            edges=np.zeros((n, 2), np.int64),
+            target=np.zeros((n, 1), np.int64),
             report=np.empty(64, np.int64),
             n_shown=0,
             n_done=0,
@@ -162,7 +165,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy needs to go on from here."""
-        self._enter()
+        if not self._entry.acquire(False):
+            raise self._busy()
         try:
             kept = {name: value for name, value in self.__dict__.items() if name != "_entry"}
             kept["_state"] = None if self._state is None else growing_of(self._state)
@@ -270,13 +274,12 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     # Reset and step
 
-    def _enter(self) -> None:
-        """RuntimeError if another thread is at work in these environments."""
-        if not self._entry.acquire(blocking=False):
-            raise RuntimeError(
-                "another thread is stepping, resetting or copying these environments: let one "
-                "thread do it, or give each thread environments of its own"
-            )
+    @staticmethod
+    def _busy() -> RuntimeError:
+        return RuntimeError(
+            "another thread is stepping, resetting or copying these environments: let one thread "
+            "do it, or give each thread environments of its own"
+        )
 
     def reset(
         self, *, seed: Seeds = None, options: dict[str, Any] | None = None
@@ -285,7 +288,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
         `seed` is that of environment 0, the others counting up, or a list; see the class.
         """
-        self._enter()
+        if not self._entry.acquire(False):
+            raise self._busy()
         try:
             mask = self._mask(options)
             # All first: a seed that is refused then leaves everything as it was.
@@ -302,7 +306,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def step(self, actions: NDArray[Any]) -> Step:
         """Answer the bin just seen in every environment: see the single environment, and above."""
-        self._enter()
+        if not self._entry.acquire(False):
+            raise self._busy()
         try:
             if self._state is None or (self._n_done and self._by_hand):
                 raise self._reset_needed()
@@ -326,7 +331,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         return np.ascontiguousarray(mask)
 
     def _seen(self) -> Bits:
-        return self._display.observations.copy() if self.copy else self._display.observations
+        return self._observations.copy() if self.copy else self._observations
 
     def _reset_needed(self) -> ResetNeeded:
         """Why no step can be taken."""
@@ -355,7 +360,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def _stepped(self, info: dict[str, Any]) -> Step:
         """What `step` returns: copies, since the next step writes to the same results."""
-        results = self._outcome.results
+        results = self._results
         return (
             self._seen(),
             results.rewards.copy(),

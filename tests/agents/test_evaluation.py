@@ -22,7 +22,7 @@ from agents import (
     record,
 )
 from agents.neurons.neuron import Neuron
-from gnm_env import Patterns, Task, draw_trial
+from gnm_env import Patterns, Task, Trial, Trials, draw_trial
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, BUSY_WEIGHT
 from tests.gnm_env.reference import pieces
 
@@ -161,8 +161,8 @@ def test_scoring_changes_nothing() -> None:
         ({"runs": 0}, "runs must be >= 1, got 0"),
         ({"cap": 0}, "cap must be >= 1, got 0"),
         ({"seed": -1}, "seed must be >= 0, got -1"),
-        ({"threads": 0}, "threads must be >= 1, got 0"),
-        ({"threads": 0, "shared": False}, "threads must be >= 1, got 0"),
+        ({"threads": 0}, "threads must be in 1 … 1024, got 0"),
+        ({"threads": 0, "shared": False}, "threads must be in 1 … 1024, got 0"),
     ],
 )
 def test_numbers_out_of_range_are_refused(keywords: dict[str, Any], message: str) -> None:
@@ -290,3 +290,14 @@ def test_the_bootstrap_interval_is_the_same_every_time_and_narrow_for_equal_valu
     irregular = np.random.default_rng(2).random(30)
     assert bootstrap_interval(irregular, seed=1) != bootstrap_interval(irregular, seed=2)
     assert bootstrap_interval([4.0] * 7) == (4.0, 4.0)
+
+
+def test_trials_of_which_only_labels_are_known_are_answered_too() -> None:
+    rule = AggregateLabel(fraction=1.0)
+    silent = NeuronAgent(GNM(), rule, n_inputs=3, initial_weight=0.0)
+    raster = np.ones((20, 3), np.bool_)
+    trials = Trials([Trial.from_dense(raster, label=k) for k in (0, 2, 1)])
+    result = answers(silent, trials)
+    assert result.table.shape[:2] == (1, 0)
+    assert result.wrong.tolist() == [2]
+    assert result.absolute.tolist() == [3.0]

@@ -43,7 +43,7 @@ def test_patterns_that_do_not_fit_the_task_are_refused() -> None:
 @pytest.mark.parametrize(
     ("keywords", "message"),
     [
-        ({"threads": 0}, "threads must be >= 1, got 0"),
+        ({"threads": 0}, "threads must be in 1 … 1024, got 0"),
         ({"threads": 1.5}, "threads must be a whole number, got 1.5"),
         ({"trials": -1}, "trials must be >= 0, got -1"),
         ({"block": 0}, "block must be >= 1, got 0"),

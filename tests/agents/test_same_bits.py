@@ -160,12 +160,6 @@ def test_agents_of_different_kinds_keep_their_places_and_their_bits(threads: int
         assert_same_history(history.of(lane), its_history)
 
 
-def test_a_list_that_names_an_agent_twice_trains_it_once() -> None:
-    agent = agent_of("gnm", "all")
-    train_many([agent, agent], BUSY, BUSY_PATTERNS, TRIALS, seed=9)
-    assert_same(agent, alone("gnm", "all")[0])
-
-
 # --- in pieces -----------------------------------------------------------------------------------
 
 

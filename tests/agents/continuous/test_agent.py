@@ -184,7 +184,9 @@ def test_a_copy_with_another_alpha_keeps_the_weights() -> None:
 
 
 def test_spiking_neurons_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"neuron must be a ContinuousGNM.*NeuronAgent"):
+    with pytest.raises(
+        ValueError, match=r"neuron must be one of ContinuousGNM.*NeuronAgent is the agent for it"
+    ):
         ContinuousAgent(GNM(), RULES[0], TASK.n_inputs)
 
 
@@ -248,7 +250,7 @@ def test_answers_are_rounded_sums() -> None:
         false_alarms += np.rint(in_noise(trial, S)).sum()
     assert np.array_equal(found.table[0], table)
     assert found.wrong[0] == wrong
-    assert found.false_alarms[0] == false_alarms
+    assert found.false_positives[0] == false_alarms
 
 
 def test_wrong_outputs_are_missed_occurrences_and_false_alarms() -> None:
