@@ -39,7 +39,7 @@ test-slow: $(VENV)/.for-test  ## the long statistical tests that make test leave
 	$(RUN) -m pytest -m slow $(ARGS)
 
 test-checked: $(VENV)/.for-test  ## random tasks, agents and environments, every array access checked
-	$(RUN) tests/campaign/run.py --only configurations --count 60 $(ARGS)
+	$(RUN) tests/campaign/run.py --only configurations --count 30 $(ARGS)
 
 campaign: $(VENV)/.for-test  ## bad inputs, kills, changed bytes: make campaign ARGS="--size full"
 	$(RUN) tests/campaign/run.py $(ARGS)
