@@ -244,7 +244,7 @@ def test_environments_that_cannot_be_wrapped_are_refused_with_a_reason():
 def test_a_level_is_0_or_1_and_nothing_that_becomes_it(action):
     env = RisingEdge(gym.make(STREAM))
     env.reset()
-    with pytest.raises(ValueError, match="action must be 0 .silent. or 1"):
+    with pytest.raises(ValueError, match=r"action must be 0 .silent. or 1"):
         env.step(action)
     many = VectorRisingEdge(gym.make_vec(STREAM, 2))
     many.reset()

@@ -44,7 +44,7 @@ def test_a_keyword_like_no_other_is_not_guessed_at(environment: Any) -> None:
 
 
 def test_a_misspelt_feedback_is_told_by_gymnasium_make() -> None:
-    with pytest.raises(ValueError, match="unknown keyword 'feedbck', did you mean 'feedback'?"):
+    with pytest.raises(ValueError, match=r"unknown keyword 'feedbck', did you mean 'feedback'\?"):
         gym.make("gnm/PatternTrial-v0", feedbck="cost")
 
 
@@ -108,5 +108,5 @@ def test_the_record_is_frozen_and_holds_the_task() -> None:
 
 @pytest.mark.parametrize("id", ["gnm/PatternTrial-v0", "gnm/PatternStream-v0"])
 def test_more_environments_than_the_memory_holds_are_refused_before_they_are_made(id: str) -> None:
-    with pytest.raises(ValueError, match="GiB.*lower num_envs"):
+    with pytest.raises(ValueError, match=r"GiB.*lower num_envs"):
         gym.make_vec(id, num_envs=1_000_000, n_inputs=1_000_000, rate=1e-6, pattern_bins=2)
