@@ -135,5 +135,5 @@ def advance_for(fourth: bool, unit: bool) -> tuple[str, Any]:
     label = f"network{'_fourth' if fourth else ''}{'_unit' if unit else ''}"
     names = {"FOURTH": fourth, "UNIT": unit}
     hill = specialise(hill_template, label, inline=True, **names)
-    hidden = specialise(hidden_step_template, label, hill=hill)
+    hidden = specialise(hidden_step_template, label, inline=True, hill=hill)
     return label, specialise(advance_template, label, inline=True, hidden_step=hidden)
