@@ -145,3 +145,11 @@ def spike_from(action: Any) -> int:
     if spike != 0 and spike != 1:
         raise ValueError(f"action must be 0 (silent) or 1 (spike), got {shown(action)}")
     return spike
+
+
+def array_of(actions: Any) -> NDArray[Any]:
+    """`actions` as an array; an empty one where they are none."""
+    try:
+        return np.asarray(actions)
+    except (TypeError, ValueError):  # ragged lists
+        return np.empty(0, object)

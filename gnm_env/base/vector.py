@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from gnm_env.base.env import checked_options
+from gnm_env.base.env import array_of, checked_options
 from gnm_env.base.kernels import (
     COST,
     DISABLED,
@@ -387,14 +387,6 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             "final_info": terminal,
             "_final_info": mask.copy(),
         }
-
-
-def array_of(actions: Any) -> NDArray[Any]:
-    """`actions` as an array; an empty one where they are none."""
-    try:
-        return np.asarray(actions)
-    except (TypeError, ValueError):  # ragged lists
-        return np.empty(0, object)
 
 
 def read_only(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

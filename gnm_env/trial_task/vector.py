@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.base.env import array_of
 from gnm_env.base.kernels import COST, DENSE, SIGN, Config, Episodes, Growing, growing_of
 from gnm_env.base.params import VectorParams, from_keywords, signature
-from gnm_env.base.vector import PatternVectorEnv, Step, array_of, read_only
+from gnm_env.base.vector import PatternVectorEnv, Step, read_only
 from gnm_env.checks import require_memory
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
