@@ -58,6 +58,7 @@ def options(parser: Parser) -> None:
         help="go on from a saved agent, its task, its patterns and its place in the stream")
     add("--checkpoint-every", type=float, default=60.0, metavar="SECONDS",
         help="save the agent so often while it learns (default 60; 0: in every block of trials)")
+    share(parser, "--import")
     share(parser, "--out", default=Path("runs/train"))
     fields.add_options(parser, {"the task": Task, **_groups(parser)})
     # fmt: on

@@ -173,7 +173,7 @@ def test_the_command_ends_with_2_and_one_clear_line(tmp_path, arguments, message
     Path(places["file"]).write_text("")
     command = [argument.format(**places) for argument in arguments]
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), *command], capture_output=True, text=True, timeout=120
+        [sys.executable, str(SCRIPT), *command], capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
