@@ -115,6 +115,10 @@ def train_template(
             error = where(error < 0.0, zero - error, error)
             n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
             total_error = total_error + error
+            # What is not finite stays so: the last bin tells for all.
+            V = load(log.V, trial.edges[len(trial.edges) - 1] - 1, zero)
+            diverged = (overflowed_in < 0.0) & (V * 0.0 != 0.0)
+            overflowed_in = where(diverged, float(first_trial + k), overflowed_in)
             c = where(overflowed_in < 0.0, correction(outcome), zero)
             if any_lane(c != 0.0):
                 store(scratch.corrections, 0, c)
