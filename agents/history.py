@@ -106,7 +106,7 @@ def checked_callback(callback: Any) -> Callback | None:
             "callback must be a function of the trials done and the history, or None, "
             f"got {shown(callback)}"
         )
-    return callback  # type: ignore[no-any-return]
+    return callback
 
 
 def _one_each(name: str, values: Any, columns: tuple[int, ...]) -> NDArray[np.float64]:

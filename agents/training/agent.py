@@ -125,7 +125,8 @@ class Agent:
         assert self._heard is not None
         bins, events = self._bin, self._heard.offsets[self._bin]
         used = (events, bins + 1, bins, bins, bins, bins * self._model.n_notes)
-        parts = [whole[:n].copy() for whole, n in zip(self._heard, used, strict=True)]
+        pairs: Any = zip(self._heard, used, strict=True)
+        parts = [buffer[:n].copy() for buffer, n in pairs]
         return bins, self._state.copy(), self._block.arrays.memory.copy(), parts
 
     def _go_on(self, bins: int, state: Any, memory: Any, parts: Any) -> None:
@@ -133,7 +134,8 @@ class Agent:
         self._make_room(max(bins, 256), len(parts[0]) + 4 * self._n_inputs + 256)
         assert self._heard is not None
         self._bin, self._state[:], self._block.arrays.memory[:] = bins, state, memory
-        for place, part in zip(self._heard, parts, strict=True):
+        pairs: Any = zip(self._heard, parts, strict=True)
+        for place, part in pairs:
             place[: len(part)] = part
 
     def __repr__(self) -> str:
@@ -191,7 +193,7 @@ class Agent:
 
     @momentum.setter
     def momentum(self, values: ArrayLike) -> None:
-        self.velocity = values  # type: ignore[assignment]
+        self.velocity = values
 
     @property
     def bounds(self) -> tuple[float, float]:

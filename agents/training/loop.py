@@ -113,18 +113,21 @@ def _require_learner(agent: Any) -> None:
 
 
 def _require_env(env: Any, agent: Any) -> None:
-    if not isinstance(env, gym.Env):
+    lacking = not all(hasattr(env, name) for name in ("reset", "step", "unwrapped"))
+    if lacking or isinstance(env, (type, gym.vector.VectorEnv)):
         raise ValueError(
             f"env must be a gymnasium Env, got {shown(env)}; "
             'make one with gymnasium.make("gnm/PatternTrial-v0"), or use train_many'
         )
     graded = getattr(getattr(agent, "model", None), "graded", None)
-    spikes = isinstance(env.action_space, gym.spaces.Discrete)
-    if graded is not None and graded == spikes:
+    actions = getattr(env, "action_space", None)
+    if graded is None or actions is None:
+        return  # an agent or an environment of another make
+    if graded == isinstance(actions, gym.spaces.Discrete):
         given, output = ("amounts", "graded") if graded else ("spikes", "spikes")
         raise ValueError(
             f"the {type(agent).__name__} answers with {given}, and the environment takes "
-            f'{env.action_space}: make it with output="{output}"'
+            f'{actions}: make it with output="{output}"'
         )
 
 

@@ -36,10 +36,11 @@ def whole_trial(n_bins: int, told: float, label: float = 0.0) -> Told:
 def segments_told(n_bins: int, info: Mapping[str, Any], presentations: bool, rule: type) -> Told:
     """What the terminal `info` of a trial of `n_bins` bins tells; ValueError if it cannot be.
 
-    With `presentations` their onsets, ends and targets are needed, else the label alone; what else
-    is there must agree with it all the same.
+    With `presentations` their onsets, ends and targets are needed, else the label alone: it may
+    then be any that a user wants, below 0 too; presentations that are there must still be possible.
     """
-    label = whole("label", _needed(info, "label", rule), low=0, high=MAX_LABEL)
+    least = 0 if presentations else -MAX_LABEL
+    label = whole("label", _needed(info, "label", rule), low=least, high=MAX_LABEL)
     if presentations and info.get("label_only", False):
         raise ValueError(
             f"{rule.__name__} needs to know where the presentations were, and of this trial only "
@@ -48,14 +49,21 @@ def segments_told(n_bins: int, info: Mapping[str, Any], presentations: bool, rul
     if presentations:
         for key in ("onsets", "targets") + (() if "ends" in info else ("pattern_bins",)):
             _needed(info, key, rule)
-    told = checked_segments(n_bins, info, label)
-    return told if presentations and told else whole_trial(n_bins, float("nan"), float(label))
+    told = _segments(n_bins, info, label)
+    if not presentations or told is None:
+        return whole_trial(n_bins, float("nan"), float(label))
+    if len(info["onsets"]) and told.target.sum() != label:
+        raise ValueError(
+            f"label must be the sum of the targets, {told.target.sum()}, got {label}: "
+            "give the terminal info of the trial that was heard"
+        )
+    return told
 
 
-def checked_segments(n_bins: int, info: Mapping[str, Any], label: int) -> Told | None:
+def _segments(n_bins: int, info: Mapping[str, Any], label: int) -> Told | None:
     """The segments of a trial of `n_bins` bins; None if `info` does not tell them.
 
-    Raises ValueError for presentations that cannot be those of such a trial with this label.
+    Raises ValueError for presentations that cannot be those of such a trial.
     """
     if "onsets" not in info or not ("ends" in info or "pattern_bins" in info):
         return None
@@ -63,7 +71,8 @@ def checked_segments(n_bins: int, info: Mapping[str, Any], label: int) -> Told |
     if "ends" in info:
         ends = whole_array("ends", info["ends"], 0, MAX_BINS)
     else:
-        ends = onsets + whole("pattern_bins", info["pattern_bins"], low=1, high=MAX_BINS)
+        least = min(len(onsets), 1)  # without presentations it may be anything
+        ends = onsets + whole("pattern_bins", info["pattern_bins"], low=least, high=MAX_BINS)
     if "targets" in info:
         owed = whole_array("targets", info["targets"], 0, MAX_TARGET)
     else:
@@ -81,11 +90,6 @@ def checked_segments(n_bins: int, info: Mapping[str, Any], label: int) -> Told |
             f"presentations must follow one another within the {n_bins} bins heard, got onsets "
             f"{shown(onsets.tolist())} and ends {shown(ends.tolist())}: an agent must hear every "
             "bin of a trial"
-        )
-    if len(onsets) and "targets" in info and owed.sum() != label:
-        raise ValueError(
-            f"label must be the sum of the targets, {owed.sum()}, got {label}: "
-            "give the terminal info of the trial that was heard"
         )
     return Told(edges, target, float(label), float("nan"))
 
