@@ -82,6 +82,7 @@ class Agent:
         drawn = model.initial_weights(rng, self._n_inputs, scale)
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
+        self._rule_memory = np.zeros(len(rule.memory_type._fields))
         self._trials = 0
         self.overflowed = False
         self._prepare()
@@ -101,6 +102,7 @@ class Agent:
             np.array(self.rule_parameters(), np.float64)[:, None],
             self._velocity[:, None],
             rule.static(self._n_inputs),
+            self._rule_memory[:, None],
         )
         self._heard: Heard | None = None
         self._make_room(256, 4 * self._n_inputs + 256)
@@ -108,7 +110,8 @@ class Agent:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = ("_model", "_rule", "_n_inputs", "_weight_bounds", "_weights", "_velocity")
-        return {name: getattr(self, name) for name in (*kept, "_trials", "overflowed")}
+        more = ("_rule_memory", "_trials", "overflowed")
+        return {name: getattr(self, name) for name in (*kept, *more)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -161,6 +164,15 @@ class Agent:
     @velocity.setter
     def velocity(self, values: ArrayLike) -> None:
         put("velocity", values, self._velocity)
+
+    @property
+    def rule_memory(self) -> NDArray[np.float64]:
+        """float64, what the rule remembers from trial to trial; assigning copies, checked."""
+        return self._rule_memory
+
+    @rule_memory.setter
+    def rule_memory(self, values: ArrayLike) -> None:
+        put("rule_memory", values, self._rule_memory)
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -253,10 +265,10 @@ class Agent:
                 f"in {self._bin} bins: an agent must hear and answer every bin of a trial, so "
                 "wrappers that skip bins or change actions cannot be used"
             )
-        if feedback == "reward":
-            return whole_trial(self._bin, told=float(reward) - 1.0)
         if feedback == "none":
             return whole_trial(self._bin, told=1.0)
+        if feedback == "reward" and not sign_only:
+            return whole_trial(self._bin, told=float(reward) - 1.0)
         if sign_only:
             if feedback != "sign":
                 raise ValueError(
@@ -265,13 +277,16 @@ class Agent:
                     "such as AggregateLabel or CriticalThreshold"
                 )
             return whole_trial(self._bin, told=float(np.sign(reward)))
-        return segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        told = segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        self._rule.check_label(told.label)
+        return told
 
     def _make_room(self, bins: int, events: int) -> None:
         """Buffers for at least `bins` bins and `events` input spikes; what they hold is kept."""
         long = Heard(
             np.empty(events, np.int32),
             np.zeros(bins + 1, np.int64),
+            np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
@@ -357,7 +372,7 @@ class Agent:
         _, advance = model.advance()
         biexponential = rule.kernel(model).biexponential
         return (
-            type(self), advance, model.static(self._n_inputs), type(rule),
+            type(self), advance, model.static(self._n_inputs), type(rule), rule.variant,
             rule.static(self._n_inputs), biexponential, self._n_inputs,
         )  # fmt: skip
 
@@ -367,11 +382,17 @@ class Agent:
         return AgentBatch(agents, source)
 
     def _take(
-        self, weights: NDArray[np.float64], velocity: NDArray[np.float64], trials: int, over: bool
+        self,
+        weights: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        rule_memory: NDArray[np.float64],
+        trials: int,
+        over: bool,
     ) -> None:
         """What training side by side has made of it."""
         self._weights[:] = weights
         self._velocity[:] = velocity
+        self._rule_memory[:] = rule_memory
         self._trials, self.overflowed = trials, over
 
     # --- checkpoints -----------------------------------------------------------------------------
@@ -405,6 +426,7 @@ class Agent:
         model = replace(self._model, **changes)  # type: ignore[type-var]
         agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
         agent.weights, agent.velocity = self._weights, self._velocity
+        agent.rule_memory = self._rule_memory
         agent._trials = self._trials
         return agent
 

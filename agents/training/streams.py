@@ -13,8 +13,11 @@ from agents.model import Arrays, Block
 from agents.simd import any_lane, full, load, pack, store, unpack, where
 from agents.training.batches import new_batch, trial_of
 from agents.training.slots import (
+    TOLD_REWARD,
     USES_ERROR,
     USES_OUTPUT,
+    USES_READOUT,
+    WEIGHS,
     WIDTH,
     Parameters,
     State,
@@ -24,6 +27,7 @@ from agents.training.slots import (
     learn_trial,
     output,
     run_trial,
+    weighed,
 )
 from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
 from gnm_env.compiled import inlined
@@ -63,6 +67,8 @@ class Learning(NamedTuple):
     """(blocks, 1, WIDTH); the trial in which a weight would have overflowed, or −1."""
     heard: Block
     """(blocks, 1, WIDTH); trials that each model had heard before."""
+    memory: Block
+    """(blocks, numbers, WIDTH); what the rule remembers from trial to trial."""
     static: tuple[int, ...]
 
 
@@ -71,6 +77,20 @@ def block_of(models: Models, block: int, memory: Block, notes: Block) -> ModelBl
     """Block `block` of the models."""
     arrays = Arrays(models.weights[block], memory, notes)
     return ModelBlock(models.parameters[block], arrays, models.static, models.n_notes)
+
+
+def new_log_template(bins: int, segments: int) -> TrialLog:
+    """Room for what trials of so many bins and segments leave for learning."""
+    return TrialLog(
+        np.empty((bins, WIDTH)),
+        np.empty((bins if USES_ERROR else 0, WIDTH)),
+        np.empty((bins if USES_OUTPUT else 0, WIDTH)),
+        np.empty((bins if USES_READOUT else 0, WIDTH)),
+        np.empty((segments, WIDTH)),
+    )
+
+
+new_log: Any = None  # bound to the template above
 
 
 def train_template(
@@ -88,27 +108,23 @@ def train_template(
     memory = np.zeros((models.n_memory, WIDTH))
     scratch = new_scratch(models.weights.shape[1], WIDTH)
     notes = np.empty((0, WIDTH))
-    log = TrialLog(
-        np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH))
-    )
+    log = new_log(0, 0)
     batch = new_batch()
     done = 0
     while done < trials:
         batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
         if longest > len(log.V) or batch.edges.size > len(log.counts):
             bins = max(2 * longest, len(log.V))
-            log = TrialLog(
-                np.empty((bins, WIDTH)),
-                np.empty((bins if USES_ERROR else 0, WIDTH)),
-                np.empty((bins if USES_OUTPUT else 0, WIDTH)),
-                np.empty((batch.edges.size, WIDTH)),
-            )
+            log = new_log(bins, batch.edges.size)
             notes = np.empty((bins * models.n_notes, WIDTH))
         for block in range(n_blocks):
             p = unpack(Parameters, models.parameters[block], zero)
             # Out of the inner loop, where a view of an array costs as much as some bins.
             model = block_of(models, block, memory, notes)
-            rule = RuleBlock(learning.parameters[block], learning.velocity[block], learning.static)
+            rule = RuleBlock(
+                learning.parameters[block], learning.velocity[block], learning.static,
+                learning.memory[block],
+            )  # fmt: skip
             decay = unpack(RuleParameters, learning.parameters[block], zero).decay
             rate = unpack(RuleParameters, learning.parameters[block], zero).learning_rate
             heard = load(learning.heard[block], 0, zero) + float(first_trial + done)
@@ -123,6 +139,8 @@ def train_template(
                 n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
                 total_error = total_error + error
                 c = where(overflowed_in < 0.0, correction(outcome), zero)
+                if WEIGHS and any_lane(c != 0.0):
+                    c = weighed(rule, c + 1.0 if TOLD_REWARD else c, c != 0.0)
                 if any_lane(c != 0.0):
                     store(scratch.corrections, 0, c)
                     left = 1.0 - (heard + float(k)) * decay
@@ -210,12 +228,7 @@ def answer_template(
     noise_bins = done = 0
     while done < trials:
         batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
-        log = TrialLog(
-            np.empty((longest, WIDTH)),
-            np.empty((longest, WIDTH)),
-            np.empty((longest, WIDTH)),
-            np.empty((batch.edges.size, WIDTH)),
-        )
+        log = new_log(longest, batch.edges.size)
         notes = np.empty((longest * models.n_notes, WIDTH))
         for k in range(drawn):
             trial = trial_of(batch, k)
