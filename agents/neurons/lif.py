@@ -67,6 +67,10 @@ class LIF(Neuron):
     def threshold(self) -> float:
         return self.theta
 
+    @property
+    def reads_V(self) -> bool:
+        return True
+
     def parameters(self) -> tuple[float, ...]:
         return (self.alpha, self.theta, float(self.refractory))
 

@@ -94,6 +94,10 @@ class MST(Neuron):
         return self.theta
 
     @property
+    def reads_V(self) -> bool:
+        return True
+
+    @property
     def v_norm(self) -> float:
         """V_norm = k^(k/(k−1)) / (k−1) with k = τ_m/τ_s."""
         k = self.tau_m / self.tau_s

@@ -91,6 +91,7 @@ class AgentBatch:
             self._blocks([agent.velocity for agent in self._agents]),
             overflow,
             self._blocks([[float(agent.trials)] for agent in self._agents]),
+            self._blocks([agent.rule_memory for agent in self._agents]),
             first.rule.static(first.n_inputs),
         )
         self._trials = 0
@@ -160,10 +161,11 @@ class AgentBatch:
         """Put what was learned into the agents."""
         weights = self._rows(self._models.weights)
         velocity = self._rows(self._learning.velocity)
+        memory = self._rows(self._learning.memory)
         overflowed = self.overflowed()
         for k, agent in enumerate(self._agents):
             heard = int(self._per_agent(self._learning.heard)[k]) + self._trials
-            agent._take(weights[k], velocity[k], heard, bool(overflowed[k] >= 0))
+            agent._take(weights[k], velocity[k], memory[k], heard, bool(overflowed[k] >= 0))
 
     def _rows(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
         """(blocks, rows, width) -> one row per agent."""
