@@ -11,6 +11,7 @@ from agents.learning.teaching import accumulate_template, replay_template
 from agents.model import Model
 from agents.training import change
 from agents.training.batches import draw_batch, take_batch
+from agents.training.exploration import explore_bin_template, explore_trial_template
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
     predict_template,
@@ -104,7 +105,12 @@ def _loops(key: Key) -> Any:
     everything["new_log"] = specialise(new_log_template, together, **of_rule)
     if key.rule.weigh is not None:
         everything["weighed"] = specialise(weighed_template, together, **of_rule)
-    made = SimpleNamespace(
+    made = SimpleNamespace()
+    if key.rule.explore is not None:
+        names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
+        everything["explore_trial"] = specialise(explore_trial_template, together, **names)
+        made.explore_bin = specialise(explore_bin_template, together, **names)
+    made.__dict__.update(
         update=specialise(update_template, together, **everything),
         survive=specialise(survive_template, alone, **of_model),
         step=specialise(step_template, alone, **of_model),
@@ -146,6 +152,7 @@ def _of_rule(key: Key) -> dict[str, Any]:
         "SEES_PRESENTATIONS": feedback == "presentations",
         "TOLD_REWARD": feedback == "reward",
         "WEIGHS": rule.weigh is not None,
+        "EXPLORES": rule.explore is not None,
         "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
         "OwnNumbers": rule.parameters_type,
         "Memory": rule.memory_type,
@@ -159,8 +166,7 @@ def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], togethe
     rule = key.rule
     names = {**of_rule}
     if rule.bin_signal is not None or rule.teaching_signal is None:
-        parameters = of_model["Parameters"]
-        names["THRESHOLD"] = parameters._fields.index(threshold_name(parameters))
+        names["THRESHOLD"] = _threshold_row(of_model)
     if rule.block_change is not None:
         return specialise(rule.block_change, together, **of_rule)
     if rule.side_by_side is not None:
@@ -185,6 +191,12 @@ def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], togethe
     learn_alone = specialise(change.learn_alone_template, key.taught, **names)
     names = {**of_rule, "THRESHOLD": names["THRESHOLD"], "learn_alone": learn_alone}
     return specialise(change.taught_change_template, together, **names)
+
+
+def _threshold_row(of_model: dict[str, Any]) -> int:
+    parameters = of_model["Parameters"]
+    row: int = parameters._fields.index(threshold_name(parameters))
+    return row
 
 
 def threshold_name(parameters: Any) -> str:
