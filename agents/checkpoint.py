@@ -86,6 +86,8 @@ def save_agent(
         "overflowed": bool(agent.overflowed),
         "trials": agent.trials,
     }
+    if agent.rng is not None:
+        header["agent_rng"] = agent.rng.bit_generator.state
     contents = {"weights": agent.weights, "velocity": agent.velocity}
     if rule.memory_type is not NoMemory:
         contents["rule_memory"] = agent.rule_memory
@@ -215,6 +217,8 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
         raise ValueError("its header does not say how far the agent was trained")
     agent = cls.rebuilt(model, rule, n_inputs, None if bounds is None else tuple(bounds))
     agent.weights, agent.velocity = weights, velocity
+    if "agent_rng" in header:
+        agent.rng = _generator(header["agent_rng"])
     if "rule_memory" in arrays:
         agent.rule_memory = arrays["rule_memory"]
     agent._trials, agent.overflowed = trials, header["overflowed"]

@@ -7,6 +7,7 @@ from agents.learning.error_trace import ErrorTrace
 from agents.learning.mpdal import MPDAL
 from agents.learning.mstdpet import MSTDPET
 from agents.learning.peak_error import PeakError
+from agents.learning.policy_gradient import PolicyGradient
 from agents.learning.psd import PSD
 from agents.learning.resume import ReSuMe
 from agents.learning.span import SPAN
@@ -25,6 +26,7 @@ __all__ = [
     "CriticalThreshold",
     "ErrorTrace",
     "PeakError",
+    "PolicyGradient",
     "ReSuMe",
     "SurrogateGradient",
     "Tempotron",

@@ -25,6 +25,9 @@ A rule may have a memory, some numbers for each neuron that last from trial to t
 checkpoints: their names are the fields of its `memory_type`, 0 at first. `weigh(p, told, memory) ->
 (correction, memory)` makes of what the rule is told (see CORRECTIONS) what it learns by, 0 being
 nothing; it is written like `bin_signal`.
+
+`explore(p, V, threshold, uniform) -> bool` draws the output of a bin while the rule learns, for
+neurons that take no notice of their own output; written likewise.
 """
 
 from __future__ import annotations
@@ -192,6 +195,7 @@ class Rule(ABC):
     bin_signal: ClassVar[Any] = None
     side_by_side: ClassVar[Any] = None
     weigh: ClassVar[Any] = None
+    explore: ClassVar[Any] = None
     weight_change: ClassVar[Any] = in_proportion
     teach: ClassVar[Any] = None
     change: ClassVar[Any] = None
@@ -202,7 +206,7 @@ class Rule(ABC):
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         ways = ("teaching_signal", "bin_signal", "side_by_side", "teach", "change", "block_change")
-        registry.register("rule", cls, (*ways, "weight_change", "weigh"))
+        registry.register("rule", cls, (*ways, "weight_change", "weigh", "explore"))
         if getattr(cls, "name", None) is None:
             return
         feedback = getattr(cls, "feedback", None)
@@ -215,7 +219,7 @@ class Rule(ABC):
                 f"{cls.__name__} must say what it teaches: by teaching_signal(static, V, E), "
                 "teach(p, trial, y) or change(p, trial, eligibility); see agents.learning.rule"
             )
-        names = ("teaching_signal", "bin_signal", "side_by_side", "weigh")
+        names = ("teaching_signal", "bin_signal", "side_by_side", "weigh", "explore")
         parts = {name: getattr(cls, name) for name in names}
         cls._compiled = {name: part and portable(part) for name, part in parts.items()}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import fields, replace
@@ -80,11 +81,13 @@ class Agent:
         if initial_weight is None:
             initial_weight = model.default_initial_weight
         scale = real("initial_weight", initial_weight, low=-1e100, high=1e100)
-        rng = np.random.default_rng((whole("seed", seed, low=0, high=2**128 - 1), 2))
+        seed = whole("seed", seed, low=0, high=2**128 - 1)
+        rng = np.random.default_rng((seed, 2))
         drawn = model.initial_weights(rng, self._n_inputs, scale)
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
         self._rule_memory = np.zeros(len(rule.memory_type._fields))
+        self.rng = np.random.default_rng((seed, 3)) if rule.explore else None
         self._trials = 0
         self.overflowed = False
         self._prepare()
@@ -259,6 +262,10 @@ class Agent:
         if out < 0.0:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
             out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        if self.rng is not None:
+            V = self._heard.V[self._bin, 0]
+            out = self._loops.explore_bin(self._rule_block, self._block, V, self.rng.random())
+            self._heard.output[self._bin] = out
         self._bin += 1
         return out
 
@@ -491,6 +498,7 @@ class Agent:
         agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
         agent.weights, agent.velocity = self._weights, self._velocity
         agent.rule_memory = self._rule_memory
+        agent.rng = copy.deepcopy(self.rng)
         agent._trials = self._trials
         return agent
 

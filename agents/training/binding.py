@@ -10,6 +10,7 @@ from agents.learning.rule import CORRECTIONS, Rule, always
 from agents.learning.teaching import accumulate_template, replay_template
 from agents.model import Model, threshold_name
 from agents.training import change
+from agents.training.exploration import explore_bin_template, explore_trial_template
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
     predict_template,
@@ -104,7 +105,13 @@ def _loops(key: Key) -> Any:
     everything["new_log"] = specialise(new_log_template, together, inline=True, **of_rule)
     if key.rule.weigh is not None:
         everything["weighed"] = specialise(weighed_template, together, **of_rule)
+    explore_bin = None
+    if key.rule.explore is not None:
+        names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
+        everything["explore_trial"] = specialise(explore_trial_template, together, **names)
+        explore_bin = specialise(explore_bin_template, together, **names)
     return SimpleNamespace(
+        explore_bin=explore_bin,
         train=specialise(train_template, together, **everything),
         answer=specialise(answer_template, together, **everything),
         update=specialise(update_template, together, **everything),
@@ -141,6 +148,7 @@ def _of_rule(key: Key) -> dict[str, Any]:
         "SEES_PRESENTATIONS": feedback == "presentations",
         "TOLD_REWARD": feedback == "reward",
         "WEIGHS": rule.weigh is not None,
+        "EXPLORES": rule.explore is not None,
         "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
         "OwnNumbers": rule.parameters_type,
         "Memory": rule.memory_type,
@@ -154,8 +162,7 @@ def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], togethe
     rule = key.rule
     names = {**of_rule}
     if rule.bin_signal is not None or rule.teaching_signal is None:
-        parameters = of_model["Parameters"]
-        names["THRESHOLD"] = parameters._fields.index(threshold_name(parameters))
+        names["THRESHOLD"] = _threshold_row(of_model)
     if rule.block_change is not None:
         return specialise(rule.block_change, together, **of_rule)
     if rule.side_by_side is not None:
@@ -182,3 +189,9 @@ def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], togethe
     learn_alone = specialise(change.learn_alone_template, key.taught, **names)
     names = {**of_rule, "THRESHOLD": names["THRESHOLD"], "learn_alone": learn_alone}
     return specialise(change.taught_change_template, together, **names)
+
+
+def _threshold_row(of_model: dict[str, Any]) -> int:
+    parameters = of_model["Parameters"]
+    row: int = parameters._fields.index(threshold_name(parameters))
+    return row

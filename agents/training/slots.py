@@ -39,10 +39,13 @@ TOLD_REWARD = False
 """Whether the correction is the reward, less 1."""
 WEIGHS = False
 """Whether the rule has its own `weigh`."""
+EXPLORES = False
+"""Whether the rule draws the output while it learns."""
 BY_BIN = False
 """Whether the rule has a `bin_signal` or `side_by_side` instead of a `teaching_signal`."""
 correction: Any = None
 weigh: Any = None
+explore: Any = None
 Memory: Any = None
 teaching_signal: Any = None
 bin_signal: Any = None
@@ -59,4 +62,5 @@ run_trial: Any = None
 compute_change: Any = None
 learn_trial: Any = None
 weighed: Any = None
+explore_trial: Any = None
 learn_alone: Any = None

@@ -12,6 +12,7 @@ from agents.learning.rule import RuleParameters
 from agents.model import Arrays, Block
 from agents.simd import any_lane, full, load, pack, store, unpack, where
 from agents.training.slots import (
+    EXPLORES,
     TOLD_REWARD,
     USES_ERROR,
     USES_OUTPUT,
@@ -22,6 +23,7 @@ from agents.training.slots import (
     State,
     advance,
     correction,
+    explore_trial,
     learn_trial,
     output,
     run_trial,
@@ -68,6 +70,8 @@ class Learning(NamedTuple):
     """(blocks, 1, WIDTH); trials that each model had heard before."""
     memory: Block
     """(blocks, numbers, WIDTH); what the rule remembers from trial to trial."""
+    generators: NDArray[np.uint64]
+    """(blocks, 4, WIDTH); see `agents.training.exploration`."""
     static: tuple[int, ...]
 
 
@@ -129,6 +133,8 @@ def train_template(
         for k in range(drawn):
             trial = trial_of(batch, k)
             outcome, _ = run_trial(p, model, trial, log)
+            if EXPLORES:
+                outcome = explore_trial(rule, model, trial, log, learning.generators[block])
             error = outcome.label - outcome.emitted
             error = where(error < 0.0, zero - error, error)
             n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)

@@ -29,9 +29,9 @@ class Entry(NamedTuple):
     """Whether it learns from labels 0 and 1 only."""
 
 
-def entry(rule: Rule, oracle: Callable[..., Lesson], **options: Any) -> Entry:
+def entry(made: Rule, oracle: Callable[..., Lesson], **options: Any) -> Entry:
     """A rule that takes the oracle's options by the same names."""
-    made = type(rule)(learning_rate=LAMBDA, **options)
+    made = type(made)(learning_rate=LAMBDA, **options)
     return Entry(made, partial(oracle, learning_rate=LAMBDA, **options), made.name == "tempotron")
 
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from agents import PolicyGradient
 from agents.learning.teaching import HeardTrial
-from tests.agents.learning.oracles import rules
+from tests.agents.learning.oracles import rules, trials
 from tests.agents.learning.oracles.neurons import hear
 from tests.agents.learning.oracles.rules import act
 from tests.agents.learning.oracles.trials import Case
@@ -93,6 +94,30 @@ def test_a_rule_teaches_in_the_bins_of_the_second_opinion(name: str, neuron: str
         lesson = oracle(case.trial, case.neuron, case.weights)
         np.testing.assert_allclose(y, lesson.y, **CLOSE)
         taught += lesson.teaches
+    assert taught >= 20
+
+
+@pytest.mark.parametrize("neuron", ["gnm", pytest.param("gnm_recovers", marks=pytest.mark.slow)])
+def test_the_policy_gradient_draws_and_learns_as_the_second_opinion_does(neuron: str) -> None:
+    """Trial after trial, so that the baseline and the agent's generator move on."""
+    rule = PolicyGradient(learning_rate=0.02, width=0.2, baseline_rate=0.3)
+    made = trials.cases(NEURONS[neuron], n=30, seed=1)
+    agent = agent_for(made[0], rule, seed=7)
+    rng, baseline, taught = np.random.default_rng((7, 3)), None, 0
+    weights, velocity = agent.weights.copy(), agent.velocity.copy()
+    for case in made:
+        uniforms = rng.random(case.trial.n_bins)
+        policy = rules.policy_gradient(
+            case.trial, NEURONS[neuron], weights, uniforms, 0.02, 0.2, baseline, 0.3
+        )
+        spikes = play(agent, trial_for(case))
+        assert np.array_equal(spikes, policy.spikes)
+        weights, velocity = act(policy.lesson, weights, velocity)
+        baseline = policy.baseline
+        np.testing.assert_allclose(agent.rule_memory, [baseline, 1.0], **CLOSE)
+        np.testing.assert_allclose(agent.velocity, velocity, **CLOSE)
+        agent.weights, agent.velocity = weights, velocity
+        taught += policy.lesson.teaches
     assert taught >= 20
 
 
