@@ -73,6 +73,11 @@ def neurons() -> dict[str, type]:
     return _complete("neuron")
 
 
+def networks() -> dict[str, type]:
+    """All networks defined so far, by name."""
+    return _complete("network")
+
+
 def rules() -> dict[str, type]:
     """All learning rules defined so far, by name."""
     return _complete("rule")
@@ -93,6 +98,11 @@ def _complete(kind: str) -> dict[str, type]:
 def find_neuron(spec: str) -> type:
     """See `find`."""
     return find("neuron", spec)
+
+
+def find_model(spec: str) -> type:
+    """A neuron or a network; see `find`."""
+    return find("network" if spec in networks() else "neuron", spec)
 
 
 def find_rule(spec: str) -> type:

@@ -100,7 +100,8 @@ class Scroll:
         wrong = output > 0 and too_many(given, owed)
         new: tuple[Any, ...] = (obs_row, shade, output, wrong, potential)
         histories = (self._inputs, self._tints, self._outputs, self._wrong, self._potentials)
-        for history, value in zip(histories, new, strict=True):
+        pairs: Any = zip(histories, new, strict=True)
+        for history, value in pairs:
             history[:-1] = history[1:]
             history[-1] = value
         self._n_bins += 1

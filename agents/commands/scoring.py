@@ -40,8 +40,8 @@ def score(
         "answers": {
             "owed": list(task.owed),
             "spikes_given": given.table[0].tolist(),
-            "false_alarms_per_1000_noise_bins": 1000.0
-            * float(given.false_alarms[0])
+            "false_positives_per_1000_noise_bins": 1000.0
+            * float(given.false_positives[0])
             / given.noise_bins,
         },
     }
@@ -80,6 +80,6 @@ def _table(given: dict[str, Any]) -> list[str]:
             for spikes, share in enumerate(shares)
         )
         lines.append(f"  {class_:>5} {owed:>4}  {cells}")
-    alarms = given["false_alarms_per_1000_noise_bins"]
+    alarms = given["false_positives_per_1000_noise_bins"]
     lines.append(f"  false alarms: {alarms:.2f} per 1,000 bins of noise")
     return lines

@@ -1,20 +1,8 @@
-"""Neurons, rules and agents by name, as experiments and command lines give them."""
+"""The agent that a neuron, or a network, and a learning rule make together."""
 
 from __future__ import annotations
 
 from typing import Any
-
-from agents import registry
-
-
-def neuron_class(spec: str) -> Any:
-    """The class of a neuron: a registered name, "module:Class" or "path/to/file.py:Class"."""
-    return _find("neuron", spec)
-
-
-def rule_class(spec: str) -> Any:
-    """The class of a learning rule, likewise."""
-    return _find("rule", spec)
 
 
 def default_rule(neuron: Any) -> str:
@@ -52,27 +40,3 @@ def new_agent(
     if neuron.graded:
         from agents.continuous import ContinuousAgent as agent_class
     return agent_class(neuron, rule, n_inputs, seed, initial_weight, **bounds)
-
-
-def _find(kind: str, spec: str) -> Any:
-    return _STAND_IN(kind).get(spec) or registry.find(kind, spec)
-
-
-def _STAND_IN(kind: str) -> dict[str, Any]:
-    from agents.continuous import ContinuousGNM
-    from agents.network import BackPropagation, Network
-    from agents.neuron_agent import NEURONS, RULES
-
-    if kind == "neuron":
-        return {**NEURONS, "continuous": ContinuousGNM, "network": Network}
-    return {**RULES, "bp": BackPropagation}
-
-
-def neurons() -> dict[str, Any]:
-    """All neurons, by name."""
-    return _STAND_IN("neuron") | registry.neurons()
-
-
-def rules() -> dict[str, Any]:
-    """All learning rules, by name."""
-    return _STAND_IN("rule") | registry.rules()

@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from agents.memory import bytes_needed
+from agents.training.source import TaskSource
 from benchmarks.peak_memory import task_of
 from benchmarks.rows import Findings, Row, Target
 from benchmarks.timing import Settings, Skip
+from gnm_env import Patterns
 
 SCRIPTS = Path(__file__).resolve().parent.parent
 MIB = 2**20
@@ -122,7 +124,9 @@ def memory(settings: Settings) -> Findings:
     rows = []
     for n_inputs, lanes, length, threads in cases:
         text = program(PEAK, n_inputs, lanes, length, threads)
-        allowed = bytes_needed(n_inputs * lanes, lanes, task_of(n_inputs, length), threads)
+        task = task_of(n_inputs, length)
+        source = TaskSource(task, Patterns.draw(task, 0))
+        allowed = bytes_needed(n_inputs * lanes, lanes, source, threads)
         also = ", two threads" if threads == 2 else ""
         rows.append(
             Row(

@@ -49,7 +49,7 @@ def sizes(settings: Settings) -> Findings:
             subjects.append(learning(str(size), make, task, n, settings.seed))
         timings = race(subjects, settings)
         note = given + (
-            "; from 210 inputs on the tenth of highest eligibility is found by cuts, not by insertion"
+            "; from 210 inputs on the tenth of highest eligibility is found by cuts"
             if name == "inputs"
             else ""
         )

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import GNM, AggregateLabel, NeuronAgent
+from agents.training.source import TaskSource
 from benchmarks.rows import Findings, rate_rows
 from benchmarks.timing import Settings, Subject, race
 from benchmarks.training import BINS, LANES, bins, learning, neurons
@@ -262,8 +263,8 @@ def drawn(task: Task, trials: int, seed: int) -> list[Trial]:
 
 def spikes_of_ours(agents: Sequence[NeuronAgent], trials: int, seed: int) -> NDArray[np.int64]:
     """Output spikes of each agent in these trials."""
-    group = NeuronAgent.lanes(agents, LISTENED, Patterns.draw(LISTENED, 0))
-    return group.answer(np.random.default_rng(seed), trials).false_alarms
+    group = NeuronAgent.batch(agents, TaskSource(LISTENED, Patterns.draw(LISTENED, 0)))
+    return group.answer(np.random.default_rng(seed), trials).false_positives
 
 
 def require_agreement(name: str, counted: NDArray[Any], expected: NDArray[np.int64]) -> None:
@@ -277,7 +278,7 @@ def require_agreement(name: str, counted: NDArray[Any], expected: NDArray[np.int
 
 def _ours(agents: Sequence[NeuronAgent], settings: Settings) -> Subject:
     trials = 500 if settings.quick else 5_000
-    group = NeuronAgent.lanes(agents, LISTENED, Patterns.draw(LISTENED, 0))
+    group = NeuronAgent.batch(agents, TaskSource(LISTENED, Patterns.draw(LISTENED, 0)))
     return Subject(
         OURS,
         lambda _: group.answer(np.random.default_rng(settings.seed), trials),

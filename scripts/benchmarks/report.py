@@ -16,7 +16,7 @@ from agents.memory import (
     BYTES_PER_SPIKE,
     BYTES_PER_WEIGHT,
 )
-from agents.neuron_lanes import LANES_PER_BLOCK
+from agents.model import Model
 from benchmarks.rows import BEST_ONLY, MET, MISSED, Curve, Findings, Row, Target
 
 HEADINGS = ("", "median", "unit", "min … max", "best", "× as fast", "core", "target", "reached")
@@ -152,7 +152,7 @@ MEMORY = f"""\
 Training n neurons with N inputs side by side takes at most {BYTES_PER_WEIGHT}·N·n + \
 {BYTES_PER_AGENT:,}·n + ({BYTES_PER_BIN} + {BYTES_PER_SPIKE}·N·p)·T·threads bytes and \
 {BYTES_AT_LEAST // 2**20} MiB, where p is the rate of input spikes and T the longest trial in \
-bins: O(N·n + T·block), with blocks of {LANES_PER_BLOCK} neurons, one block per thread. The agents \
+bins: O(N·n + T·block), with blocks of {Model.widest} neurons, one block per thread. The agents \
 are counted. The table above compares this with the peak of the resident memory."""
 
 
