@@ -18,6 +18,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents import registry
+from agents.learning.rule import NoMemory
+from gnm_env.checks import generator, whole
 from gnm_env.files import ArraySpec, atomic_write, open_arrays, write_arrays
 from gnm_env.task import Patterns, Task, task_arrays
 
@@ -31,6 +33,7 @@ _ARRAYS = {
     "weights": ArraySpec("f8", (None,)),
     "velocity": ArraySpec("f8", (None,)),
     "momentum": ArraySpec("f8", (None,)),
+    "rule_memory": ArraySpec("f8", (None,)),
     "patterns": ArraySpec("u1", (None,)),
 }
 _BIT_GENERATORS = {
@@ -83,7 +86,11 @@ def save_agent(
         "overflowed": bool(agent.overflowed),
         "trials": agent.trials,
     }
+    if agent.rng is not None:
+        header["agent_rng"] = agent.rng.bit_generator.state
     contents = {"weights": agent.weights, "velocity": agent.velocity}
+    if rule.memory_type is not NoMemory:
+        contents["rule_memory"] = agent.rule_memory
     for name, array in contents.items():
         if not np.isfinite(array).all():
             raise ValueError(
@@ -102,7 +109,7 @@ def save_agent(
         contents["patterns"] = np.packbits(patterns.dense())
         header["patterns_shape"] = patterns.shape
     if rng is not None:
-        state = rng.bit_generator.state
+        state = generator("rng", rng).bit_generator.state
         if state["bit_generator"] not in _BIT_GENERATORS:
             raise ValueError(
                 f"a checkpoint cannot keep a generator of kind {state['bit_generator']}; "
@@ -210,12 +217,19 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
         raise ValueError("its header does not say how far the agent was trained")
     agent = cls.rebuilt(model, rule, n_inputs, None if bounds is None else tuple(bounds))
     agent.weights, agent.velocity = weights, velocity
+    if "agent_rng" in header:
+        agent.rng = _generator(header["agent_rng"])
+    if "rule_memory" in arrays:
+        agent.rule_memory = arrays["rule_memory"]
     agent._trials, agent.overflowed = trials, header["overflowed"]
     return agent
 
 
 def _class(kind: str, named: dict[str, Any]) -> Any:
-    return registry.find_class(kind, named["name"], named.get("class"))
+    home = named.get("class")  # format 1 does not tell it
+    if home is not None and not (isinstance(home, str) and ":" in home):
+        raise ValueError(f"its header does not name the class of its {kind}, but {home!r}")
+    return registry.find_class(kind, named["name"], home)
 
 
 def _task(header: dict[str, Any]) -> Task | None:
@@ -225,7 +239,7 @@ def _task(header: dict[str, Any]) -> Task | None:
 def _patterns(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Patterns | None:
     if "patterns_shape" not in header:
         return None
-    shape = tuple(int(n) for n in header["patterns_shape"])
+    shape = tuple(whole("patterns_shape", n, low=1) for n in header["patterns_shape"])
     n_bits = math.prod(shape)
     if min(shape, default=0) < 1 or len(arrays["patterns"]) != -(-n_bits // 8):
         raise ValueError(f"its patterns do not fill the shape {shape}")

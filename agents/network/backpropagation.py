@@ -58,7 +58,7 @@ def error_trace_of(
     """E(t) of one network in a trial, (T,), from the potential V (T,) of its readout."""
     n_bins, n_segments = len(V), len(trial.target)
     potential, above = V.copy().reshape(n_bins, 1), np.zeros((n_bins, 1))
-    log = TrialLog(potential, above, above, np.zeros((n_segments, 1)))
+    log = TrialLog(potential, above, above, above, np.zeros((n_segments, 1)))
     E = np.zeros(n_bins)
     for segment in range(n_segments):
         for t in range(trial.edges[segment], trial.edges[segment + 1]):

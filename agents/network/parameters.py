@@ -69,6 +69,11 @@ class Network(Model):
         for name in ("theta_b", "theta_r"):
             real(name, getattr(self, name), above=0.0)
         real("h", self.h, low=1.0)
+        if not np.isfinite(np.float64(self.h) / np.float64(self.theta_b)):
+            raise ValueError(
+                f"h / theta_b, the steepness of the Hill function, must be finite, got h = "
+                f"{self.h:g} and theta_b = {self.theta_b:g}: choose a larger theta_b"
+            )
 
     @property
     def width(self) -> int:

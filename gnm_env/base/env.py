@@ -14,18 +14,18 @@ from gymnasium.error import ResetNeeded
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.base.params import EnvParams
+from gnm_env.base.params import EnvParams, HasParams
 from gnm_env.checks import generator, shown, whole
 from gnm_env.generators import Generators
 
 
-class PatternEnv(gym.Env[NDArray[np.int8], Any]):
+class PatternEnv(HasParams, gym.Env[NDArray[np.int8], Any]):
     """Base of the environments. Subclasses say what `reset` and `step` do."""
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(self, params: EnvParams, action_space: spaces.Space[Any]) -> None:
-        self.task, self.patterns = params.task, params.patterns
+        self._params = params
         self.render_mode = params.render_mode
         self.observation_space = spaces.Box(0, 1, (params.n_inputs,), np.int8)
         self.action_space = action_space

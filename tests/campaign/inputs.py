@@ -896,10 +896,13 @@ def _learning() -> list[Case]:
         made += _of(own, f"a = {one}\na.begin_trial()\na.learn(-1.0, «»)", ["info()"])
         made += _of(own, f"a = {one}\na.act(«»)\na.learn(-1.0, info())", ["np.ones(4, np.int8)"])
         made += _of(own, make + "for _ in range(3): a.learn(«», info())", ["-1.0"])
-    # A rule that only asks how much was owed does not look at where.
+    # A rule that only asks how much was owed needs no more than the label, which may be any.
+    alone = ("learn(-1.0, {'label': 1})", "learn(-1.0, info(label=-1))")
     made = [
         dataclasses.replace(
-            c, fine="heard(agent())" in c.code and "info(" in c.code and "label=" not in c.code
+            c,
+            fine="heard(agent())" in c.code
+            and (c.code.endswith(alone) or ("info(" in c.code and "label=" not in c.code)),
         )
         for c in made
     ]
@@ -1064,7 +1067,7 @@ def _running() -> list[Case]:
         own, score.replace("seed=1", "seed=1, threads=«»"), ["0", "-1", "'x'", "2.5", "10**30"]
     )
     made += _of(own, score.replace("seed=1", "seed=1, shared=«»"), BOOL)
-    made += _of(own, "answers(agent(), task, patterns, trials=«»)", [*WHOLE, "0"])
+    made += _of(own, "answers(agent(), task, patterns, trials=«»)", [*WHOLE[1:], "0"])
     made += _of(own, "answers(agent(), task, patterns, trials=2, seed=«»)", SEED)
     made += _of(
         own, "answers(«», task, patterns, trials=2)", ["None", "[]", "3", "'x'", "[agent(), 3]"]
