@@ -4,6 +4,7 @@
 `agents.network` and `agents.rl`.
 """
 
+from agents.check import check_neuron, check_rule
 from agents.checkpoint import Checkpoint, load_checkpoint
 from agents.evaluation import (
     MistakeRate,
@@ -66,6 +67,8 @@ __all__ = [
     "WeightOverflow",
     "answers",
     "bootstrap_interval",
+    "check_neuron",
+    "check_rule",
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",

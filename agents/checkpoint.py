@@ -78,7 +78,7 @@ def save_agent(
     header: dict[str, Any] = {
         "format": FORMAT,
         "agent": _of_class("agent", type(agent)),
-        "model": _of_class(_kind_of(model), type(model)) | {"parameters": _parameters(model)},
+        "model": _of_class(model.kind, type(model)) | {"parameters": _parameters(model)},
         "rule": _of_class("rule", type(rule)) | {"parameters": _parameters(rule)},
         "n_inputs": agent.n_inputs,
         "weight_bounds": agent.weight_bounds,
@@ -130,10 +130,6 @@ def _of_class(kind: str, cls: type) -> dict[str, Any]:
             "its own"
         )
     return {"name": name, "class": registry.home(cls)}
-
-
-def _kind_of(model: Any) -> str:
-    return "network" if registry.known("network", model.name) is type(model) else "neuron"
 
 
 def _parameters(part: Any) -> dict[str, Any]:

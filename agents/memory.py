@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 from agents.training.source import Source
+from gnm_env.checks import bytes_there
 
 BYTES_PER_WEIGHT = 56
 """A weight and its last change, in the agent and side by side (32), the agent's room for the input
@@ -38,22 +36,10 @@ def bytes_needed(n_weights: int, n_agents: int, source: Source, threads: int) ->
     )
 
 
-def bytes_there() -> float | None:
-    """Memory of this machine, or of the container in it; None where the system does not tell."""
-    try:
-        there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # Windows has no sysconf
-        return None
-    try:
-        return min(there, float(Path("/sys/fs/cgroup/memory.max").read_text()))
-    except (OSError, ValueError):  # no container, or one without a limit ("max")
-        return there
-
-
 def require_memory(n_weights: int, n_agents: int, source: Source, threads: int) -> None:
     """ValueError if agents with all that they need exceed the memory that is there."""
     needed, there = bytes_needed(n_weights, n_agents, source, threads), bytes_there()
-    if there is not None and needed > there:
+    if needed > there:
         raise ValueError(
             f"{n_agents:,} agents of {source.n_inputs:,} inputs side by side need "
             f"{needed / 2**30:,.1f} GiB, this machine has {there / 2**30:,.1f}: "

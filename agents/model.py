@@ -22,6 +22,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from agents import registry
+
 Block = NDArray[np.float64]
 """WIDTH models side by side: (rows, WIDTH); of many blocks, (blocks, rows, WIDTH)."""
 
@@ -75,6 +77,13 @@ class Model(ABC):
     widest: ClassVar[int] = 32
     """Most models side by side in one block: with more, what they work on leaves the cache."""
 
+    kind: ClassVar[str] = "neuron"
+    """Where it is registered: see `agents.registry`."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        registry.register(cls.kind, cls, ("step", "advance", "compiled_step"))
+
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
         """The numbers of `parameters_type`, in order."""
@@ -127,3 +136,14 @@ class Model(ABC):
     def psp_kernel(self) -> PSPKernel | None:
         """The presynaptic trace; None for a model whose potential is not linear in its inputs."""
         return None
+
+
+def threshold_name(parameters: Any) -> str:
+    """The name of the readout's threshold among the parameters of a neuron."""
+    for name in ("theta_r", "theta"):
+        if name in parameters._fields:
+            return name
+    raise ValueError(
+        f"the parameters of a neuron must hold its threshold under the name theta or theta_r, "
+        f"got {', '.join(parameters._fields)}"
+    )

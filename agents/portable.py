@@ -114,13 +114,13 @@ class _Rewriter(ast.NodeTransformer):
         return self._joined(node, ast.BitAnd(), pairs)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        if _is_static(node.test):
+        if self._is_static(node.test):
             return self.generic_visit(node)
         self.generic_visit(node)
         return self._call(node, "__where", node.test, node.body, node.orelse)
 
     def visit_If(self, node: ast.If) -> ast.AST:
-        if not _is_static(node.test):
+        if not self._is_static(node.test):
             self._refuse(node, "if …:", "x = new if condition else x, which is done in every lane")
         return self.generic_visit(node)
 
@@ -147,8 +147,7 @@ class _Rewriter(ast.NodeTransformer):
             f"neurons side by side, each of which may go another way; write {instead}"
         )
 
-
-def _is_static(test: ast.expr) -> bool:
-    """Whether a condition is the same for all neurons: it asks for `static` or for constants."""
-    names = [node for node in ast.walk(test) if isinstance(node, ast.Name)]
-    return all(node.id == "static" or node.id.isupper() for node in names)
+    def _is_static(self, test: ast.expr) -> bool:
+        """Whether a condition is the same for all neurons: it asks for `static` or for globals."""
+        own = set(self._code.co_varnames) - {"static"}
+        return all(node.id not in own for node in ast.walk(test) if isinstance(node, ast.Name))

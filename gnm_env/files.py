@@ -392,14 +392,15 @@ def open_arrays(
     """
     place = _path(path, "read")
     try:
-        if not stat.S_ISREG(os.stat(place).st_mode):
-            raise _of_another_kind(place, what, _described(place))
-        file = open(place, "rb")  # noqa: SIM115
+        mode = os.stat(place).st_mode
+        file = open(place, "rb") if stat.S_ISREG(mode) else None  # noqa: SIM115
     except FileNotFoundError:
         raise ValueError(f"there is no {what} {place}; give the path of a saved one") from None
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         blame = _blame(place, error)
         raise ValueError(f"cannot read the {what} {_shortened(place)}: {blame}") from None
+    if file is None:
+        raise _of_another_kind(place, what, _described(place))
     with file:
         try:
             size = os.fstat(file.fileno()).st_size

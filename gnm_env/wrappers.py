@@ -7,6 +7,9 @@ environments, which does the same, environment by environment and bit by bit.
 
 from __future__ import annotations
 
+import numbers
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -17,7 +20,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from gnm_env.checks import real, whole
+from gnm_env.base.env import array_of, spike_from
+from gnm_env.checks import real, require_memory, shown, whole
 from gnm_env.compiled import compiled
 
 __all__ = [
@@ -29,6 +33,54 @@ __all__ = [
 ]
 
 
+MAX_DECAYS = 1_000
+"""Most traces of one channel."""
+
+
+@dataclass(frozen=True)
+class TraceParams:
+    """What synaptic traces are made from: the arguments of `SynapticTrace`; checks itself."""
+
+    decays: ArrayLike
+    scale: float
+    previous_action: bool
+    own_decay: float | None
+    rate: float | None
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        put("decays", _checked_decays(self.decays))
+        put("scale", real("scale", self.scale, above=0.0))
+        if not isinstance(self.previous_action, (bool, np.bool_)):
+            raise ValueError(
+                f"previous_action must be True or False, got {shown(self.previous_action)}"
+            )
+        if self.own_decay is not None:
+            put("own_decay", real("own_decay", self.own_decay, 0.0, 1.0, above=0.0))
+        if self.rate is not None:
+            put("rate", real("rate", self.rate, low=0.0, high=1.0))
+
+    @property
+    def own(self) -> list[float]:
+        """Decays of the traces of the agent's own spikes; the previous action has decay 1."""
+        own = [1.0] if self.previous_action else []
+        return own if self.own_decay is None else [*own, self.own_decay]
+
+
+def _checked_decays(decays: Any) -> tuple[float, ...]:
+    """One decay or a row of them as floats in (0, 1], or ValueError."""
+    if isinstance(decays, np.ndarray):
+        decays = decays.tolist()
+    if isinstance(decays, numbers.Real):
+        decays = [decays]
+    if not isinstance(decays, Sequence) or isinstance(decays, (str, bytes)):
+        raise ValueError(f"decays must be a number or a row of numbers, got {shown(decays)}")
+    whole("the number of decays, at least one decay,", len(decays), low=1, high=MAX_DECAYS)
+    return tuple(real("decays", decay, 0.0, 1.0, above=0.0) for decay in decays)
+
+
 class Traces:
     """Synaptic traces of n environments side by side; what `SynapticTrace` and its twin share.
 
@@ -38,42 +90,44 @@ class Traces:
     """
 
     def __init__(
-        self,
-        n_envs: int,
-        input_space: spaces.Space[Any],
-        rate: float,
-        decays: ArrayLike,
-        scale: float,
-        previous_action: bool,
-        own_decay: float | None,
+        self, n_envs: int, input_space: spaces.Space[Any], rate: float, params: TraceParams
     ) -> None:
         if not isinstance(input_space, spaces.Box) or len(input_space.shape) != 1:
             raise ValueError(f"SynapticTrace needs a Box of shape (N,) to trace, got {input_space}")
-        alphas = np.array(
-            [real("decays", float(d), 0.0, 1.0, above=0.0) for d in np.atleast_1d(decays)]
-        )
-        if alphas.size == 0:
-            raise ValueError("decays must hold at least one decay, got none")
-        scale = real("scale", scale, above=0.0)
-        own = [1.0] if previous_action else []
-        if own_decay is not None:
-            own.append(real("own_decay", own_decay, 0.0, 1.0, above=0.0))
+        alphas = np.array(params.decays)
+        own = np.array(params.own, np.float64)
         # x is a sum of independent bits, each weighted by its age: Var x = p(1−p) / (1 − (1−α)²).
         # Where every bit is sure (p = 0 or 1) there is no variance to go by.
         bit = np.sqrt(rate * (1.0 - rate)) or 1.0
-        jumps = scale * np.sqrt(1.0 - (1.0 - alphas) ** 2) / bit
+        with np.errstate(over="ignore", under="ignore"):
+            jumps = params.scale * np.sqrt(1.0 - (1.0 - alphas) ** 2) / bit
+            # The geometric sum of a spike in every bin; a little more, for the rounding of long
+            # sums.
+            highest = np.concatenate(
+                [np.repeat(jumps / alphas, input_space.shape[0]), 1.0 / own]
+            ) * np.float64(1.001)
+            self._jump = jumps.astype(np.float32)
+            bound = highest.astype(np.float32)
+        if not (np.isfinite(bound).all() and (self._jump >= np.finfo(np.float32).tiny).all()):
+            raise ValueError(
+                "traces must fit into float32, got up to "
+                f"{highest.max():.3g} at scale = {params.scale:g} and rate = {rate:g}: "
+                "choose a scale nearer to 1, or decays and a rate further from 0"
+            )
         self._keep = (1.0 - alphas).astype(np.float32)
-        self._jump = jumps.astype(np.float32)
-        self._own_keep = np.float32(1.0) - np.array(own, np.float32)
-        n_inputs = input_space.shape[0]
-        self.values = np.zeros((n_envs, alphas.size * n_inputs + len(own)), np.float32)
-        # The geometric sum of a spike in every bin; a little more, for the rounding of long sums.
-        highest = np.concatenate(
-            [np.repeat(jumps / alphas, n_inputs), 1.0 / np.array(own, np.float64)]
+        self._own_keep = np.float32(1.0) - own.astype(np.float32)
+        width = alphas.size * input_space.shape[0] + len(own)
+        require_memory(
+            f"{n_envs:,} rows of {width:,} traces", 8.0 * n_envs * width, "use fewer decays"
         )
-        self.space = spaces.Box(
-            np.float32(0.0), (1.001 * highest).astype(np.float32), dtype=np.float32
-        )
+        self.values = np.zeros((n_envs, width), np.float32)
+        self.space = spaces.Box(np.float32(0.0), bound, dtype=np.float32)
+
+    def taken(self, actions: Any) -> NDArray[np.int64]:
+        """The actions (n,) as spikes; where they are not traced they may be amounts of any size."""
+        if len(self._own_keep) == 0:
+            return np.zeros(len(self.values), np.int64)
+        return np.asarray(actions, np.int64).reshape(len(self.values))
 
     def start(self, bits: NDArray[Any], which: NDArray[np.bool_] | None = None) -> None:
         """Begin episodes with the inputs `bits` (n, N) where `which` (n,) is set; None: all."""
@@ -115,30 +169,44 @@ def _follow(
             values[env, own] = own_keep[k] * values[env, own] + np.float32(actions[env])
 
 
-def _require_spikes(
-    action_space: spaces.Space[Any], previous_action: bool, own_decay: float | None
-) -> None:
-    """ValueError if own spikes are to be shown and the actions are not spikes."""
-    if (previous_action or own_decay is not None) and action_space != spaces.Discrete(2):
+def _traces_of(env: Any, n_envs: int, params: TraceParams) -> Traces:
+    """Traces for `env`, single or vector; ValueError if it has nothing to be traced."""
+    single = isinstance(env, gym.Env)
+    actions = env.action_space if single else env.single_action_space
+    if params.own and actions != spaces.Discrete(2):
         raise ValueError(
             "previous_action and own_decay trace spikes, so the actions must be Discrete(2), "
-            f"got {action_space}; leave both out"
+            f"got {actions}; leave both out"
+        )
+    rate = _rate(env) if params.rate is None else params.rate
+    inputs = env.observation_space if single else env.single_observation_space
+    return Traces(n_envs, inputs, rate, params)
+
+
+def _require(env: Any, kind: type) -> None:
+    """ValueError unless `env` is an environment of that kind."""
+    if not isinstance(env, kind):
+        raise ValueError(
+            f"env must be a gymnasium {kind.__name__}, got {shown(env)}; "
+            "use gymnasium.make, or make_vec for the Vector wrappers"
         )
 
 
 def _rate(env: Any) -> float:
-    """Spike probability of the inputs, as the environment's task says."""
-    task = getattr(env.unwrapped, "task", None)
-    if task is None and isinstance(env, VectorEnv):
+    """Spike probability of the inputs, as the environment's task or data set says."""
+    source: Any = env.unwrapped
+    if isinstance(source, VectorEnv) and getattr(source, "envs", None):
         # Gymnasium's own vector environments keep their parts to themselves.
-        parts = getattr(env.unwrapped, "envs", None)
-        task = getattr(parts[0].unwrapped, "task", None) if parts else None
-    if task is None:
+        source = source.envs[0].unwrapped  # type: ignore[attr-defined]
+    task, trials = getattr(source, "task", None), getattr(source, "trials", None)
+    if task is not None:
+        return float(task.rate)
+    if trials is None:
         raise ValueError(
             f"SynapticTrace needs the rate of the inputs, and {env.unwrapped} has no task to tell "
             "it: give rate=<spike probability per channel and bin>"
         )
-    return float(task.rate)
+    return float(trials.rates.mean())
 
 
 class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConstructorArgs):
@@ -158,11 +226,13 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
         previous_action: append the action of the bin before (0 in the first bin).
         own_decay: if given, append the trace y(t) = (1−own_decay) y(t−1) + action(t−1) of the
             agent's own spikes, unscaled.
-        rate: spike probability p per channel and bin. None: that of the environment's task.
+        rate: spike probability p per channel and bin. None: that of the environment's task, or the
+            mean of its data set.
 
     Raises:
-        ValueError: a decay outside (0, 1], scale <= 0, observations that are not a row, a rate
-            that nobody knows, or own spikes to be traced where actions are amounts.
+        ValueError: a decay outside (0, 1], more than MAX_DECAYS of them, scale <= 0, traces that
+            float32 cannot hold, observations that are not a row, a rate that nobody knows, or own
+            spikes to be traced where actions are amounts.
     """
 
     def __init__(
@@ -174,6 +244,8 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
         own_decay: float | None = None,
         rate: float | None = None,
     ) -> None:
+        _require(env, gym.Env)
+        params = TraceParams(decays, scale, previous_action, own_decay, rate)
         RecordConstructorArgs.__init__(
             self,
             decays=decays,
@@ -183,11 +255,7 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
             rate=rate,
         )
         gym.Wrapper.__init__(self, env)
-        _require_spikes(env.action_space, previous_action, own_decay)
-        p = _rate(env) if rate is None else real("rate", rate, low=0.0, high=1.0)
-        self._traces = Traces(
-            1, env.observation_space, p, decays, scale, previous_action, own_decay
-        )
+        self._traces = _traces_of(env, 1, params)
         self.observation_space = self._traces.space
 
     def reset(
@@ -199,7 +267,7 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
 
     def step(self, action: Any) -> tuple[NDArray[np.float32], Any, bool, bool, dict[str, Any]]:
         bits, reward, terminated, truncated, info = self.env.step(action)
-        self._traces.follow(np.atleast_2d(bits), np.asarray(action, np.int64).reshape(1))
+        self._traces.follow(np.atleast_2d(bits), self._traces.taken(action))
         return self._traces.values[0].copy(), reward, terminated, truncated, info
 
 
@@ -221,6 +289,8 @@ class VectorSynapticTrace(
         own_decay: float | None = None,
         rate: float | None = None,
     ) -> None:
+        _require(env, VectorEnv)
+        params = TraceParams(decays, scale, previous_action, own_decay, rate)
         RecordConstructorArgs.__init__(
             self,
             decays=decays,
@@ -230,21 +300,11 @@ class VectorSynapticTrace(
             rate=rate,
         )
         VectorWrapper.__init__(self, env)
-        _require_spikes(env.single_action_space, previous_action, own_decay)
-        p = _rate(env) if rate is None else real("rate", rate, low=0.0, high=1.0)
-        self._traces = Traces(
-            env.num_envs,
-            env.single_observation_space,
-            p,
-            decays,
-            scale,
-            previous_action,
-            own_decay,
-        )
+        self._traces = _traces_of(env, env.num_envs, params)
         self.single_observation_space = self._traces.space
         self.observation_space = batch_space(self._traces.space, env.num_envs)
         self._mode = _autoreset_mode(env)
-        self._over = np.zeros(env.num_envs, np.bool_)
+        self._done = np.zeros(env.num_envs, np.bool_)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -252,21 +312,21 @@ class VectorSynapticTrace(
         which = _reset_mask(options)
         bits, infos = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         self._traces.start(bits, which)
-        self._over[slice(None) if which is None else which] = False
+        self._done[slice(None) if which is None else which] = False
         return self._traces.values.copy(), infos
 
     def step(self, actions: Any) -> tuple[NDArray[np.float32], Any, Any, Any, dict[str, Any]]:
         bits, rewards, terminated, truncated, infos = self.env.step(actions)
-        taken = np.asarray(actions, np.int64).ravel()
+        taken = self._traces.taken(actions)
         over = terminated | truncated
         if self._mode == AutoresetMode.SAME_STEP and over.any():
             infos = self._finish(bits, taken, over, infos)
         else:
             self._traces.follow(bits, taken)
         if self._mode == AutoresetMode.NEXT_STEP:
-            if self._over.any():
-                self._traces.start(bits, self._over)
-            self._over = over
+            if self._done.any():
+                self._traces.start(bits, self._done)
+            self._done = over
         return self._traces.values.copy(), rewards, terminated, truncated, infos
 
     def _finish(
@@ -299,9 +359,13 @@ def _autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
 
 
 def _reset_mask(options: dict[str, Any] | None) -> NDArray[np.bool_] | None:
-    """The environments that a partial reset begins anew; None means all."""
-    mask = (options or {}).get("reset_mask")
-    return None if mask is None else np.array(mask, np.bool_)
+    """The environments that a partial reset begins anew; None means all.
+
+    A copy, taken before the environment looks at the options: Gymnasium's takes the mask out of
+    them. What is no mask the environment refuses.
+    """
+    mask = options.get("reset_mask") if isinstance(options, Mapping) else None
+    return mask.astype(np.bool_) if isinstance(mask, np.ndarray) else None
 
 
 class RisingEdge(gym.Wrapper[Any, int, Any, Any], RecordConstructorArgs):
@@ -315,6 +379,7 @@ class RisingEdge(gym.Wrapper[Any, int, Any, Any], RecordConstructorArgs):
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
+        _require(env, gym.Env)
         RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         _require_two_actions(env.action_space)
@@ -327,9 +392,7 @@ class RisingEdge(gym.Wrapper[Any, int, Any, Any], RecordConstructorArgs):
         return self.env.reset(seed=seed, options=options)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        if not self.action_space.contains(np.int64(action)):
-            raise ValueError(f"action must be 0 or 1, got {action!r}")
-        level, before = int(action), self._level
+        level, before = spike_from(action), self._level
         self._level = level
         return self.env.step(int(level > before))
 
@@ -338,33 +401,42 @@ class VectorRisingEdge(VectorWrapper[Any, NDArray[Any], Any, Any, Any], RecordCo
     """`RisingEdge` for vector environments."""
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        _require(env, VectorEnv)
         RecordConstructorArgs.__init__(self)
         VectorWrapper.__init__(self, env)
         _require_two_actions(env.single_action_space)
         self._mode = _autoreset_mode(env)
         self._levels = np.zeros(env.num_envs, np.int64)
-        self._over = np.zeros(env.num_envs, np.bool_)
+        self._done = np.zeros(env.num_envs, np.bool_)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         which = _reset_mask(options)
+        begun = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         self._levels[slice(None) if which is None else which] = 0
-        self._over[slice(None) if which is None else which] = False
-        return self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        self._done[slice(None) if which is None else which] = False
+        return begun
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        levels = np.array(actions, np.int64).ravel()
-        if not self.action_space.contains(levels):
-            raise ValueError(f"actions must be {self.num_envs} levels of 0 or 1, got {actions!r}")
+        levels = array_of(actions)
+        if (
+            levels.dtype.kind not in "iub"
+            or levels.shape != (self.num_envs,)
+            or ((levels != 0) & (levels != 1)).any()
+        ):
+            raise ValueError(
+                f"actions must be {self.num_envs} levels of 0 or 1, got {shown(actions)}"
+            )
+        levels = levels.astype(np.int64)
         observations, rewards, terminated, truncated, infos = self.env.step(
             np.where(levels > self._levels, 1, 0)
         )
         over = terminated | truncated
         # A new episode begins with level 0: at once, or at the step after, whose action is ignored.
-        begun = over if self._mode == AutoresetMode.SAME_STEP else self._over
+        begun = over if self._mode == AutoresetMode.SAME_STEP else self._done
         self._levels = np.where(begun, 0, levels)
-        self._over = over
+        self._done = over
         return observations, rewards, terminated, truncated, infos
 
 
@@ -381,9 +453,10 @@ class SeededEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """
 
     def __init__(self, env: gym.Env[Any, Any], seed: int) -> None:
+        _require(env, gym.Env)
+        self._next_seed = whole("seed", seed, low=0)
         RecordConstructorArgs.__init__(self, seed=seed)
         gym.Wrapper.__init__(self, env)
-        self._next_seed = whole("seed", seed, low=0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -42,7 +42,7 @@ from agents.model import Model, PSPKernel
 from agents.portable import portable
 from agents.simd import like, load, store, where
 from gnm_env.checks import real, whole
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 
 FEEDBACK: Mapping[str, str] = {
     "sign": "whether the sum of the output spikes was too small or too large",
@@ -103,7 +103,7 @@ class NoMemory(NamedTuple):
     unused: Any
 
 
-@compiled
+@inlined
 def sign_of_error(outcome: Outcome) -> Any:
     """+1 where more output was owed, −1 where less, 0 where the sum was right."""
     zero = like(0.0, outcome.emitted)
@@ -112,26 +112,26 @@ def sign_of_error(outcome: Outcome) -> Any:
     )
 
 
-@compiled
+@inlined
 def whole_error(outcome: Outcome) -> Any:
     """Output missing in the trial, negative where there was too much."""
     return outcome.label - outcome.emitted
 
 
-@compiled
+@inlined
 def any_error(outcome: Outcome) -> Any:
     """1 where the error trace is anything but zero."""
     return where(outcome.has_error, 1.0, like(0.0, outcome.emitted))
 
 
-@compiled
+@inlined
 def reward_less_one(outcome: Outcome) -> Any:
     """−|label − emitted| − 1: a reward of 0 can teach, too."""
     error = outcome.label - outcome.emitted
     return where(error < 0.0, error, -error) - 1.0
 
 
-@compiled
+@inlined
 def always(outcome: Outcome) -> Any:
     """1: every trial teaches."""
     return like(1.0, outcome.emitted)
@@ -147,7 +147,7 @@ CORRECTIONS: Mapping[str, Any] = {
 """correction(outcome) -> c by feedback: 0 where a trial teaches nothing, else what it tells."""
 
 
-@compiled
+@inlined
 def in_proportion(p: RuleParameters, static: Any, c: Any, eligibility: Any) -> None:
     """Δ_i = λ ε_i, in place."""
     for i in range(len(eligibility)):

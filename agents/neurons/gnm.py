@@ -82,8 +82,8 @@ def step_template(
 
 
 def _bound(recovery: str) -> Any:
-    hill = specialise(hill_template, recovery, RECOVERY=recovery)
-    return specialise(step_template, recovery, RECOVERY=recovery, hill=hill)
+    hill = specialise(hill_template, recovery, inline=True, RECOVERY=recovery)
+    return specialise(step_template, recovery, inline=True, RECOVERY=recovery, hill=hill)
 
 
 STEPS = {recovery: _bound(recovery) for recovery in (NONE, WHOLE, INFINITE, REAL)}

@@ -7,8 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
-from gnm_env.checks import real, whole
-from gnm_env.compiled import compiled
+from gnm_env.checks import MAX_BINS, real, whole
+from gnm_env.compiled import inlined
 
 
 class Parameters(NamedTuple):
@@ -23,7 +23,7 @@ class State(NamedTuple):
     """Bins left whose input is ignored."""
 
 
-@compiled
+@inlined
 def step(
     p: Parameters, static: tuple[int, ...], state: State, current: Any
 ) -> tuple[State, Response]:
@@ -44,7 +44,7 @@ class LIF(Neuron):
 
     Attributes:
         alpha: α, decay of the membrane potential per bin, 0 … 1.
-        refractory: bins after an output spike whose input is ignored.
+        refractory: bins after an output spike whose input is ignored, at most MAX_BINS.
         theta: ϑ, threshold, in membrane-potential units.
     """
 
@@ -60,7 +60,7 @@ class LIF(Neuron):
 
     def __post_init__(self) -> None:
         real("alpha", self.alpha, low=0.0, high=1.0)
-        whole("refractory", self.refractory, low=0)
+        whole("refractory", self.refractory, low=0, high=MAX_BINS)
         real("theta", self.theta, above=0.0)
 
     @property

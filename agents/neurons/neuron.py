@@ -17,8 +17,9 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
-from agents import registry
-from agents.model import Arrays, Model, PSPKernel, Response
+import numpy as np
+
+from agents.model import Arrays, Model, PSPKernel, Response, threshold_name
 from agents.portable import portable
 from agents.simd import like, load
 from gnm_env.compiled import inlined, specialise
@@ -33,7 +34,8 @@ def input_current(weights: Any, channels: Any, first: int, last: int, zero: Any)
     """I(t) = Σ_i w_i s_i(t), summed from 0 over the ascending channels[first:last]."""
     current = zero
     for e in range(first, last):
-        current = current + load(weights, channels[e], zero)
+        # Unsigned: signed indices count from the end as well, and numba pays for looking.
+        current = current + load(weights, channels[np.uint64(e)], zero)
     return current
 
 
@@ -75,13 +77,17 @@ class Neuron(Model):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        registry.register("neuron", cls, ("step", "advance", "compiled_step"))
         if "step" in vars(cls):
             cls._compiled = (cls.name, portable(cls.step))
 
     def parameters(self) -> tuple[float, ...]:
         """The fields of the dataclass, in order; a neuron that needs other numbers overrides it."""
         return tuple(float(getattr(self, name)) for name in self.parameters_type._fields)
+
+    @property
+    def threshold(self) -> float:
+        """The parameter theta_r or theta; a neuron with another name for it overrides this."""
+        return float(getattr(self, threshold_name(self.parameters_type)))
 
     def compiled_step(self) -> tuple[str, Any]:
         """The step, compiled, and a name that tells it from every other."""

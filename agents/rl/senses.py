@@ -14,6 +14,7 @@ from gnm_env.checks import real
 from gnm_env.wrappers import (
     RisingEdge,
     SynapticTrace,
+    TraceParams,
     Traces,
     VectorRisingEdge,
     VectorSynapticTrace,
@@ -56,9 +57,8 @@ class Senses:
         """The traces of n streams; None if the raw bits are shown."""
         if not self.decays:
             return None
-        return Traces(
-            n, inputs, rate, self.decays, self.scale, self.previous_action, self.own_decay
-        )
+        params = TraceParams(self.decays, self.scale, self.previous_action, self.own_decay, rate)
+        return Traces(n, inputs, rate, params)
 
     def wrap(self, env: _Env) -> _Env:
         """`env`, single or vector, seen through these senses."""

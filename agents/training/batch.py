@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.training.binding import loops
+from agents.training.compile_errors import explained
 from agents.training.exploration import put_state, state_of
 from agents.training.source import Source
-from agents.training.streams import Learning, Models
+from agents.training.streams import MOST_SPIKES, Learning, Models, Tally
 
 if TYPE_CHECKING:
     from agents.training.agent import Agent
@@ -115,29 +117,45 @@ class AgentBatch:
 
         Returns, per agent, the number of trials answered wrongly and Σ |label − emitted|.
         """
-        run = getattr(self._loops, f"train_{self._source.kind}")
-        wrong, absolute = run(rng, ahead, trials, self._models, self._learning, self._trials)
+        wrong, absolute = self._zeros(), self._zeros()
+        for done, batch, drawn, longest in self._source.batches(rng, ahead, trials):
+            try:
+                self._loops.train(
+                    batch, drawn, longest, self._models, self._learning, self._trials + done,
+                    wrong, absolute,
+                )  # fmt: skip
+            except NumbaError as error:
+                raise explained(error, self._agents[0].model, self._agents[0].rule) from None
         self._trials += trials
         return self._per_agent(wrong).astype(np.int64), self._per_agent(absolute)
 
+    def _zeros(self) -> NDArray[np.float64]:
+        """A number for each lane, (blocks, 1, width)."""
+        return np.zeros((len(self._models.weights), 1, self._width))
+
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
         """Bins that each agent survives on the endless stream of `rng`, at most `cap`."""
-        bins = self._loops.survive(rng, self._source.stream(), cap, self._models)
+        try:
+            bins = self._loops.survive(rng, self._source.stream(), cap, self._models)
+        except NumbaError as error:
+            raise explained(error, self._agents[0].model) from None
         return self._per_agent(bins).astype(np.int64)
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         """Responses to `trials` trials of the source, learning off."""
+        n_blocks, n_classes = len(self._models.weights), self._source.n_classes
+        table = np.zeros((n_blocks, self._width, n_classes, MOST_SPIKES + 1), np.int64)
+        tally = Tally(table, self._zeros(), self._zeros(), self._zeros())
+        noise_bins = 0
         ahead = self._source.ahead(rng, trials)
-        run = getattr(self._loops, f"answer_{self._source.kind}")
-        table, false_positives, wrong, absolute, noise_bins = run(
-            rng, ahead, trials, self._source.n_classes, self._models
-        )
+        for _, batch, drawn, longest in self._source.batches(rng, ahead, trials):
+            noise_bins += self._loops.answer(batch, drawn, longest, self._models, tally)
         return Answers(
             table.reshape(-1, *table.shape[2:])[: len(self._agents)],
-            self._per_agent(false_positives).astype(np.int64),
+            self._per_agent(tally.false_positives).astype(np.int64),
             noise_bins,
-            self._per_agent(wrong).astype(np.int64),
-            self._per_agent(absolute),
+            self._per_agent(tally.wrong).astype(np.int64),
+            self._per_agent(tally.absolute),
             trials,
         )
 

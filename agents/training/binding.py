@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 from agents.learning.rule import CORRECTIONS, Rule, always
 from agents.learning.teaching import accumulate_template, replay_template
-from agents.model import Model
+from agents.model import Model, threshold_name
 from agents.training import change
-from agents.training.batches import draw_batch, take_batch
 from agents.training.exploration import explore_bin_template, explore_trial_template
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
@@ -36,9 +35,6 @@ from agents.training.trial import (
     weighed_template,
 )
 from gnm_env.compiled import specialise
-
-SOURCES: dict[str, Any] = {"task": draw_batch, "data": take_batch}
-"""What fills a batch with trials, by the kind of source."""
 
 
 def loops(model: Model, rule: Rule, width: int = 1) -> Any:
@@ -97,31 +93,33 @@ def _loops(key: Key) -> Any:
     alone = f"{key.label}_{key.width}"
     together = f"{key.taught}_{key.width}"
     flags = {name: of_rule[name] for name in ("USES_ERROR", "USES_OUTPUT", "USES_READOUT")}
-    bins = specialise(run_bins_template, together, **of_model, **flags)
-    trial = specialise(run_trial_template, together, **of_model, **flags, run_bins=bins)
+    bins = specialise(run_bins_template, together, inline=True, **of_model, **flags)
+    trial = specialise(
+        run_trial_template, together, inline=True, **of_model, **flags, run_bins=bins
+    )
     compute_change = _change(key, of_model, of_rule, together)
-    learn = specialise(learn_trial_template, together, **of_rule, compute_change=compute_change)
+    learn = specialise(
+        learn_trial_template, together, inline=True, **of_rule, compute_change=compute_change
+    )
     everything = {**of_model, **of_rule, "run_trial": trial, "learn_trial": learn}
-    everything["new_log"] = specialise(new_log_template, together, **of_rule)
+    everything["new_log"] = specialise(new_log_template, together, inline=True, **of_rule)
     if key.rule.weigh is not None:
         everything["weighed"] = specialise(weighed_template, together, **of_rule)
     made = SimpleNamespace()
     if key.rule.explore is not None:
         names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
-        everything["explore_trial"] = specialise(explore_trial_template, together, **names)
+        everything["explore_trial"] = specialise(
+            explore_trial_template, together, inline=True, **names
+        )
         made.explore_bin = specialise(explore_bin_template, together, **names)
     made.__dict__.update(
+        train=specialise(train_template, together, **everything),
+        answer=specialise(answer_template, together, **everything),
         update=specialise(update_template, together, **everything),
         survive=specialise(survive_template, alone, **of_model),
         step=specialise(step_template, alone, **of_model),
         predict=specialise(predict_template, alone, **of_model),
     )
-    for source, fill_batch in SOURCES.items():
-        names = {**everything, "fill_batch": fill_batch}
-        train = specialise(train_template, f"{together}_{source}", **names)
-        answer = specialise(answer_template, f"{together}_{source}", **names)
-        setattr(made, f"train_{source}", train)
-        setattr(made, f"answer_{source}", answer)
     return made
 
 
@@ -170,13 +168,15 @@ def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], togethe
     if rule.block_change is not None:
         return specialise(rule.block_change, together, **of_rule)
     if rule.side_by_side is not None:
-        sums = specialise(change.side_by_side_template, together, **names)
-        return specialise(change.pointwise_change_template, together, **names, sum_eligibility=sums)
+        sums = specialise(change.side_by_side_template, together, inline=True, **names)
+        names["sum_eligibility"] = sums
+        return specialise(change.pointwise_change_template, together, inline=True, **names)
     if rule.bin_signal is not None or rule.teaching_signal is not None:
         signal = specialise(change.bin_signal_template, together, inline=True, **names)
         names["bin_signal"] = signal
-        sums = specialise(change.sum_eligibility_template, together, **names)
-        return specialise(change.pointwise_change_template, together, **names, sum_eligibility=sums)
+        sums = specialise(change.sum_eligibility_template, together, inline=True, **names)
+        names["sum_eligibility"] = sums
+        return specialise(change.pointwise_change_template, together, inline=True, **names)
     names |= {**of_model, "WIDTH": 1}
     kernel = "bi" if key.biexponential else "mono"
     replay = specialise(replay_template, key.label, **names)
@@ -197,14 +197,3 @@ def _threshold_row(of_model: dict[str, Any]) -> int:
     parameters = of_model["Parameters"]
     row: int = parameters._fields.index(threshold_name(parameters))
     return row
-
-
-def threshold_name(parameters: Any) -> str:
-    """The name of the readout's threshold among the parameters of a neuron."""
-    for name in ("theta_r", "theta"):
-        if name in parameters._fields:
-            return name
-    raise ValueError(
-        f"the parameters of a neuron must hold its threshold under the name theta or theta_r, "
-        f"got {', '.join(parameters._fields)}"
-    )

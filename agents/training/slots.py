@@ -56,9 +56,6 @@ accumulate: Any = None
 epsilon: Any = None
 OwnNumbers: Any = None
 
-# Of the stream: trials that are drawn, or those of a data set.
-fill_batch: Any = None
-
 # Templates that were bound before.
 run_bins: Any = None
 run_trial: Any = None

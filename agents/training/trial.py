@@ -117,11 +117,13 @@ def run_bins_template(
     zero = full(0.0, WIDTH)
     total = zero
     bins_above = zero
+    first = trial.offsets[start]
     for t in range(start, stop):
+        last = trial.offsets[np.uint64(t + 1)]
         state, response = advance(
-            p, model.static, model.arrays, state,
-            trial.channels, trial.offsets[t], trial.offsets[t + 1], t * model.n_notes,
-        )  # fmt: skip
+            p, model.static, model.arrays, state, trial.channels, first, last, t * model.n_notes
+        )
+        first = last
         out = output(response, zero)
         total = total + out
         store(log.V, t, response.V)

@@ -5,10 +5,11 @@ and the output of all are counted on at once, and only the environments that are
 spike or an end falls into the bin, are looked at one by one.
 
 The spikes of an environment wait in its row of `events`. An event is a bin and a channel in one
-number: bin · 2^shift + channel; channel 2^shift − 1 marks the end of what was drawn. The segments
-of its trial wait in rows beside it. A row that proves too short makes all rows longer. Every
-environment draws from a generator of its own: what it hears depends on no others. `shown` are the
-places of all ones in the observations, which the next step clears again.
+number: bin · 2^shift + channel; channel 2^shift − 1 marks the end of what was drawn. Presentations
+that were drawn wait in a row of their own, in one number each too: first bin · 2^32 + class. For
+dense feedback there are the segments of the trial besides. A row that proves too short makes all
+rows longer. Every environment draws from a generator of its own: what it hears depends on no
+others. `shown` are the places of all ones in the observations, which the next step clears again.
 
 All of this is in one record, since an argument costs a compiled call as much as some environments.
 Its parts are records in turn, by meaning; those that change hold their arrays by reference.
@@ -40,6 +41,8 @@ class Config(NamedTuple):
     """Greatest action."""
     feedback: int
     tolerance: float
+    tells_ends: bool
+    """Whether trials tell where their presentations end."""
     shift: int
     """Bits for a channel in an event."""
 
@@ -85,7 +88,7 @@ class OutcomeArrays(NamedTuple):
     results: Any
     """TrialResults or StreamResults."""
     heads: NDArray[np.int64]
-    """(n, 6), for each trial in `report`: the environment, where its four lists begin, the end."""
+    """(n, 5), for each trial in `report`: the environment, where three lists begin, their end."""
 
 
 class Growing(NamedTuple):
@@ -93,12 +96,13 @@ class Growing(NamedTuple):
 
     events: NDArray[Any]
     """int32 or int64 (n, width)."""
+    presentations: NDArray[np.int64]
+    """(n, width), of drawn trials."""
     edges: NDArray[np.int64]
-    """Segments of the present trial, a row each; see `gnm_env.segments`."""
+    """Segments of the present trial, a row each; see `gnm_env.segments`. For dense feedback."""
     target: NDArray[np.int64]
-    classes: NDArray[np.int64]
     report: NDArray[np.int64]
-    """Onsets, classes, targets and ends of each trial that the last step ended."""
+    """Onsets, classes, targets, and ends if asked for, of each trial that the last step ended."""
     n_shown: int
     n_done: int
     n_told: int
@@ -128,7 +132,7 @@ class Ahead(_Proxy):
     """What waits to be shown, a row for each environment; as in Growing."""
 
 
-structref.define_constructor(Ahead, AheadType, ["events", "edges", "target", "classes"])
+structref.define_constructor(Ahead, AheadType, ["events", "presentations", "edges", "target"])
 
 
 @structref.register
@@ -231,9 +235,9 @@ def new_state(
         episodes=episodes,
         ahead=Ahead(
             events=growing.events,
+            presentations=growing.presentations,
             edges=growing.edges,
             target=growing.target,
-            classes=growing.classes,
         ),
         display=Display(
             observations=display.observations,
@@ -267,9 +271,9 @@ def growing_of(state: Any) -> Growing:
     ahead, display, outcome = state.ahead, state.display, state.outcome
     return Growing(
         ahead.events,
+        ahead.presentations,
         ahead.edges,
         ahead.target,
-        ahead.classes,
         outcome.report,
         display.n_shown,
         outcome.n_done,

@@ -75,7 +75,7 @@ class PatternStreamVectorEnv(PatternVectorEnv):
 
     def _terminal_info(self) -> dict[str, Any]:
         """The info of streams that a mistake has ended, from the results."""
-        results = self._outcome.results
+        results = self._results
         if not results.terminated.any():  # truncated only
             return {}
         mask = read_only(results.terminated)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,53 +10,56 @@ from numpy.typing import NDArray
 from gnm_env.trial import Trial
 
 
-class TerminalInfo(NamedTuple):
-    """`info` at the end of a trial, and at no other time: each field is a key.
+def terminal_info(
+    label: Any, emitted: Any, onsets: Any, classes: Any, targets: Any, pattern_bins: Any
+) -> dict[str, Any]:
+    """The keys of the terminal `info`; the contract with every agent.
 
-    In a single environment each is a number or a list, in a vector environment an array over
-    environments, of numbers or of lists.
+    In a single environment each is a number or a list with one entry per presentation, in a vector
+    environment an array over environments, of numbers or of lists.
+
+    Args:
+        label, emitted: output owed by the whole trial, and given.
+        onsets, classes, targets: first bin, class from 0, and output owed of each presentation.
+        pattern_bins: bins of each presentation; 0 where they differ.
     """
+    return {
+        "label": label,
+        "emitted": emitted,
+        "onsets": onsets,
+        "classes": classes,
+        "targets": targets,
+        "pattern_bins": pattern_bins,
+    }
 
-    label: Any
-    """Output owed by the whole trial."""
-    emitted: Any
-    """Output given."""
-    onsets: Any
-    """First bin of each presentation."""
-    classes: Any
-    """Class of each presentation, from 0."""
-    targets: Any
-    """Output owed by each presentation."""
-    ends: Any
-    """The bin after the last of each presentation."""
-    pattern_bins: Any
-    """Bins of each presentation; 0 where they differ, or where there is none to tell."""
+
+_MASKS = [f"_{key}" for key in terminal_info(*range(6))]
 
 
 def info_of(trial: Trial, emitted: float) -> dict[str, Any]:
-    """The terminal `info` of one trial."""
-    told = TerminalInfo(
-        label=trial.label,
-        emitted=emitted,
-        onsets=trial.onsets.tolist(),
-        classes=trial.classes.tolist(),
-        targets=trial.targets.tolist(),
-        ends=trial.ends.tolist(),
-        pattern_bins=trial.pattern_bins or 0,
+    """The terminal `info` of one trial.
+
+    `ends`, the bin after the last of each presentation, is there where they differ in length, and
+    `label_only`, True, where only the label is known.
+    """
+    edges, target = trial.arrays.edges, trial.arrays.target
+    info = terminal_info(
+        trial.label,
+        emitted,
+        edges[1:-1:2].tolist(),
+        trial.classes.tolist(),
+        target[1::2].tolist(),
+        trial.pattern_bins or 0,
     )
-    info = told._asdict()
+    if trial.pattern_bins is None and info["onsets"]:
+        info["ends"] = edges[2::2].tolist()
     if trial.label_only:
         info["label_only"] = True
     return info
 
 
-def masked(
-    told: TerminalInfo, mask: NDArray[np.bool_], label_only: NDArray[np.bool_]
-) -> dict[str, Any]:
+def masked(info: dict[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
     """The terminal `info` of many environments, in those of `mask`, as Gymnasium has it."""
-    info: dict[str, Any] = {}
-    for key, value in zip(told._fields, told, strict=True):
-        info[key], info[f"_{key}"] = value, mask
-    if label_only.any():
-        info["label_only"], info["_label_only"] = label_only.copy(), label_only.copy()
+    for key in _MASKS:
+        info[key] = mask
     return info

@@ -29,7 +29,7 @@ from gnm_env.base.kernels import (
 from gnm_env.compiled import compiled, inlined, specialise
 from gnm_env.rules import compiled_dense_reward, compiled_reward_for
 from gnm_env.sampling import begin_trial, fill_trial, longer_buffers
-from gnm_env.segments import compiled_segment_at
+from gnm_env.segments import compiled_segment_at, fill_segments
 
 TRIAL_STATE = np.dtype(
     [
@@ -40,6 +40,7 @@ TRIAL_STATE = np.dtype(
         ("label_only", np.int64),  # whether it is not known where the label was earned
         ("segment", np.int64),  # the present segment, and the output in it so far
         ("given", np.float64),
+        ("number", np.int64),  # of the trial in the data set
         ("n_heard", np.int64),  # trials of the present epoch, where they come from a data set
         ("anew", np.int64),  # the generator is new, and so is the epoch
     ]
@@ -88,20 +89,38 @@ def fetch(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int
     number of all. No array is exchanged for a longer one in here: numba counts references to those
     that are.
     """
-    raise NotImplementedError  # the two below take its place
+    raise NotImplementedError  # `specialise` puts one function for each source in its place
 
 
 def make_room(state: Any, i: int) -> None:
     """Room for the trial that environment `i` is about to hear."""
-    raise NotImplementedError  # the two below take its place
+    raise NotImplementedError  # likewise
+
+
+def report_trial(state: Any, i: int, report: NDArray[np.int64], first: int) -> int:
+    """Report the presentations of environment `i` from `first` on; returns where they end."""
+    raise NotImplementedError  # likewise
+
+
+@inlined
+def _begin(state: Any, i: int, label: int, n_bins: int, n_presentations: int) -> None:
+    """Environment `i` begins a trial: nothing heard and nothing given yet."""
+    counters, s = state.counters, state.episodes.records[i]
+    s.label, s.n_bins, s.n_presentations = label, n_bins, n_presentations
+    s.segment, s.given = 0, 0.0
+    state.episodes.emitted[i] = 0
+    counters.bin_[i], counters.event[i], counters.deadline[i] = 0, 0, state.config.limit
+
+
+# Trials that are drawn from a task.
 
 
 @compiled
 def _draw_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
     """`fetch` of trials that are drawn."""
-    rngs, task, shift = state.rngs, state.source, state.config.shift
-    ahead, room, counters = state.ahead, state.room, state.counters
-    events, classes_ahead = ahead.events, ahead.classes
+    rngs, task, config = state.rngs, state.source, state.config
+    ahead, room = state.ahead, state.room
+    events, presentations = ahead.events, ahead.presentations
     channels, offsets, onsets, classes = room.channels, room.offsets, room.onsets, room.classes
     draft = room.draft
     n = first
@@ -113,40 +132,37 @@ def _draw_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool)
         fits = fill_trial(rngs[i], task, channels, offsets, onsets, classes, draft)
         n_bins, n_presentations = draft[0].bin_, draft[0].occurrence
         fits = fits and offsets[n_bins] < events.shape[1]
-        fits = fits and n_presentations <= classes_ahead.shape[1]
+        fits = fits and n_presentations <= presentations.shape[1]
         if fits:
-            store_events(events, i, shift, n_bins, channels, offsets)
-            _store_segments(ahead, i, n_presentations, n_bins, onsets, classes, task)
-            _begin(state.episodes, counters, i, state.config.limit)
-            s = state.episodes.records[i]
-            s.label, s.n_bins, s.n_presentations = draft[0].label, n_bins, n_presentations
-            s.pattern_bins = task.pattern_bins
+            store_events(events, i, config.shift, n_bins, channels, offsets)
+            for k in range(n_presentations):
+                presentations[i, k] = (onsets[k] << 32) + classes[k]
+            if config.feedback == DENSE:
+                _store_segments(state, i, n_presentations, n_bins)
+            _begin(state, i, draft[0].label, n_bins, n_presentations)
+            state.episodes.records[i].pattern_bins = task.pattern_bins
             n += 1
             is_new = True
     return n
 
 
-@inlined
-def _store_segments(
-    ahead: Any,
-    i: int,
-    n: int,
-    n_bins: int,
-    onsets: NDArray[np.int64],
-    classes: NDArray[np.int64],
-    task: Any,
-) -> None:
-    """Put the segments of a trial with `n` presentations of the task's patterns into row `i`."""
-    edges, target = ahead.edges[i], ahead.target[i]
-    edges[0], target[0] = 0, 0
-    for k in range(n):
-        class_ = classes[k]
-        ahead.classes[i, k] = class_
-        edges[2 * k + 1] = onsets[k]
-        edges[2 * k + 2] = onsets[k] + task.pattern_bins
-        target[2 * k + 1] = task.targets[class_]
-        target[2 * k + 2] = 0
-    edges[2 * n + 1] = n_bins
+@compiled
+def _store_segments(state: Any, i: int, n: int, n_bins: int) -> None:
+    """Put the segments of the drawn trial, with `n` presentations, into row `i`."""
+    task, ahead = state.source, state.ahead
+    onsets, classes = state.room.onsets[:n], state.room.classes[:n]
+    _widen_segments(ahead, n)
+    fill_segments(
+        onsets, onsets + task.pattern_bins, task.targets[classes], n_bins,
+        ahead.edges[i], ahead.target[i],
+    )  # fmt: skip
+
+
+@compiled
+def _widen_segments(ahead: Any, n: int) -> None:
+    """Rows for the segments of a trial with `n` presentations."""
+    ahead.edges = widened(ahead.edges, 2 * n + 2)
+    ahead.target = widened(ahead.target, 2 * n + 1)
 
 
 @compiled
@@ -157,41 +173,40 @@ def _draw_room(state: Any, i: int) -> None:
         state.source, room.channels, room.offsets, room.onsets, room.classes, room.draft
     )
     draft = room.draft[0]
-    _widen(ahead, draft.n_events, draft.occurrence)
+    ahead.events = widened(ahead.events, draft.n_events + 1)
+    ahead.presentations = widened(ahead.presentations, draft.occurrence)
 
 
 @compiled
-def _widen(ahead: Any, n_events: int, n_presentations: int) -> None:
-    """Rows that hold so many events and presentations, and the ends behind them."""
-    ahead.events = widened(ahead.events, n_events + 1)
-    ahead.classes = widened(ahead.classes, n_presentations)
-    ahead.edges = widened(ahead.edges, 2 * ahead.classes.shape[1] + 2)
-    ahead.target = widened(ahead.target, 2 * ahead.classes.shape[1] + 1)
+def _report_drawn(state: Any, i: int, report: NDArray[np.int64], first: int) -> int:
+    """`report_trial` of a trial that was drawn."""
+    targets, presentations = state.source.targets, state.ahead.presentations
+    n = state.episodes.records[i].n_presentations
+    for k in range(n):
+        class_ = presentations[i, k] & 0xFFFFFFFF
+        report[first + k] = presentations[i, k] >> 32
+        report[first + n + k] = class_
+        report[first + 2 * n + k] = targets[class_]
+    return first + 3 * n
 
 
-@inlined
-def _begin(episodes: Any, counters: Any, i: int, limit: int) -> None:
-    """Nothing heard and nothing given yet."""
-    s = episodes.records[i]
-    s.segment, s.given = 0, 0.0
-    episodes.emitted[i] = 0
-    counters.bin_[i], counters.event[i], counters.deadline[i] = 0, 0, limit
+# Trials of a data set: what waits of them are their events, all else stays where it is.
 
 
 @compiled
 def _hear_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool) -> int:
     """`fetch` of the trials that come next in the data set's order."""
-    ahead = state.ahead
+    trials, events = state.source.trials, state.ahead.events
     n = first
     while n < which.size:
         i = which[n]
         number = _next_number(state, i)
-        n_events, n_presentations = _sizes(state.source.trials, number)
-        if n_events >= ahead.events.shape[1] or n_presentations > ahead.classes.shape[1]:
+        if trials.first_spike[number + 1] - trials.first_spike[number] >= events.shape[1]:
             return n
         _copy_trial(state, i, number)
-        _begin(state.episodes, state.counters, i, state.config.limit)
-        state.episodes.records[i].n_heard += 1
+        s = state.episodes.records[i]
+        s.number = number
+        s.n_heard += 1
         n += 1
     return n
 
@@ -209,51 +224,53 @@ def _next_number(state: Any, i: int) -> int:
 
 
 @compiled
-def _sizes(trials: Any, number: int) -> tuple[int, int]:
-    """Spikes and presentations of a trial in a data set."""
-    n_events = trials.first_spike[number + 1] - trials.first_spike[number]
-    return n_events, (trials.first_edge[number + 1] - trials.first_edge[number] - 2) // 2
-
-
-@compiled
 def _copy_trial(state: Any, i: int, number: int) -> None:
-    """Put a trial of the data set into row `i`; there is room."""
-    trials, ahead, shift = state.source.trials, state.ahead, state.config.shift
-    n_events, n = _sizes(trials, number)
+    """Begin trial `number` of the data set in environment `i`; there is room for its events."""
+    trials, ahead, config = state.source.trials, state.ahead, state.config
     first, edge = trials.first_spike[number], trials.first_edge[number]
-    for e in range(n_events):
-        ahead.events[i, e] = (np.int64(trials.bins[first + e]) << shift) + trials.channels[
-            first + e
-        ]
-    label = 0
-    for k in range(2 * n + 1):
-        ahead.edges[i, k] = trials.edges[edge + k]
-        ahead.target[i, k] = trials.target[edge + k]
-        label += trials.target[edge + k]
+    n_events = trials.first_spike[number + 1] - first
+    n = (trials.first_edge[number + 1] - edge - 2) // 2
     n_bins = trials.edges[edge + 2 * n + 1]
-    ahead.edges[i, 2 * n + 1] = n_bins
-    ahead.events[i, n_events] = ((n_bins + 1) << shift) - 1
-    pattern_bins = state.source.pattern_bins if n == 0 else ahead.edges[i, 2] - ahead.edges[i, 1]
-    for k in range(n):
-        # Two edges of each trial before belong to no presentation.
-        ahead.classes[i, k] = trials.classes[edge // 2 - number + k]
-        if ahead.edges[i, 2 * k + 2] - ahead.edges[i, 2 * k + 1] != pattern_bins:
-            pattern_bins = 0
+    for e in range(n_events):
+        bin_ = np.int64(trials.bins[first + e])
+        ahead.events[i, e] = (bin_ << config.shift) + trials.channels[first + e]
+    ahead.events[i, n_events] = ((n_bins + 1) << config.shift) - 1
+    edges = trials.edges[edge : edge + 2 * n + 2]
+    target = trials.target[edge : edge + 2 * n + 1]
+    if config.feedback == DENSE:
+        _widen_segments(ahead, n)
+        for k in range(2 * n + 1):
+            ahead.edges[i, k], ahead.target[i, k] = edges[k], target[k]
+        ahead.edges[i, 2 * n + 1] = n_bins
+    _begin(state, i, target.sum(), n_bins, n)
     s = state.episodes.records[i]
-    s.label, s.n_bins, s.n_presentations, s.pattern_bins = label, n_bins, n, pattern_bins
     s.label_only = trials.label_only[number]
+    s.pattern_bins = state.source.pattern_bins if n == 0 else edges[2] - edges[1]
+    for k in range(n):
+        if edges[2 * k + 2] - edges[2 * k + 1] != s.pattern_bins:
+            s.pattern_bins = 0
 
 
 @compiled
 def _hear_room(state: Any, i: int) -> None:
     """`make_room` for the next trial of the data set."""
-    number = _next_number(state, i)
-    n_events, n_presentations = _sizes(state.source.trials, number)
-    _widen(state.ahead, n_events, n_presentations)
+    first_spike, number = state.source.trials.first_spike, _next_number(state, i)
+    n_events = first_spike[number + 1] - first_spike[number]
+    state.ahead.events = widened(state.ahead.events, n_events + 1)
 
 
-begin_drawn = specialise(begin_trials, "drawn", fetch=_draw_trials, make_room=_draw_room)
-begin_recorded = specialise(begin_trials, "recorded", fetch=_hear_trials, make_room=_hear_room)
+@compiled
+def _report_recorded(state: Any, i: int, report: NDArray[np.int64], first: int) -> int:
+    """`report_trial` of a trial of the data set."""
+    trials, s = state.source.trials, state.episodes.records[i]
+    n, edge = s.n_presentations, trials.first_edge[s.number]
+    for k in range(n):
+        report[first + k] = trials.edges[edge + 2 * k + 1]
+        report[first + n + k] = trials.classes[edge // 2 - s.number + k]
+        report[first + 2 * n + k] = trials.target[edge + 2 * k + 1]
+        if state.config.tells_ends:
+            report[first + 3 * n + k] = trials.edges[edge + 2 * k + 2]
+    return int(first + (4 * n if state.config.tells_ends else 3 * n))
 
 
 def step_trials(state: Any, actions: NDArray[Any]) -> tuple[int, int, int, bool]:
@@ -284,7 +301,7 @@ def step_trials(state: Any, actions: NDArray[Any]) -> tuple[int, int, int, bool]
     for k in range(n_done):
         done[k] = ended[k]
     outcome.n_done = n_done
-    is_new = _tell(state)
+    is_new = tell(state)
     if config.autoreset == SAME_STEP:
         set_aside(state.display, done[:n_done])
         begin_trials(state, done[:n_done])
@@ -303,10 +320,9 @@ def _forget(outcome: Any) -> None:
     fill_zero(results.truncated)
 
 
-@compiled
-def _tell(state: Any) -> bool:
+def tell(state: Any) -> bool:
     """Write results and report of the environments that are done; whether the report is new."""
-    outcome, config, ahead, counters = state.outcome, state.config, state.ahead, state.counters
+    outcome, config, counters = state.outcome, state.config, state.counters
     results, heads, report = outcome.results, outcome.heads, outcome.report
     room = report.size
     n_told = end = 0
@@ -324,9 +340,10 @@ def _tell(state: Any) -> bool:
             n = s.n_presentations
             if end + 4 * n > report.size:
                 report = _longer(report, end, end + 4 * n)
-            _report(report, heads[n_told], end, i, ahead.edges[i], ahead.target[i],
-                    ahead.classes[i, :n])  # fmt: skip
-            end += 4 * n
+            heads[n_told, 0] = i
+            for part in range(4):
+                heads[n_told, 1 + part] = end + part * n
+            end = report_trial(state, i, report, end)
             n_told += 1
     outcome.n_told, outcome.report = n_told, report
     return report.size > room
@@ -335,20 +352,21 @@ def _tell(state: Any) -> bool:
 @compiled
 def _reward_densely(state: Any, actions: NDArray[Any]) -> None:
     """Dense feedback for the answers to the present bins; 0 for those who are done."""
-    outcome, ahead, tolerance = state.outcome, state.ahead, state.config.tolerance
+    outcome, tolerance = state.outcome, state.config.tolerance
+    edges, target, records = state.ahead.edges, state.ahead.target, state.episodes.records
     bins, rewards = state.counters.bin_, outcome.results.rewards
     for i in range(actions.size):
-        s = state.episodes.records[i]
+        s = records[i]
         rewards[i] = 0.0
         if bins[i] < s.n_bins:
-            edges, bin_ = ahead.edges[i], np.int64(bins[i])
-            segment = compiled_segment_at(edges, s.segment, bin_)
+            bin_ = np.int64(bins[i])
+            segment = compiled_segment_at(edges[i], s.segment, bin_)
             if segment != s.segment:
                 s.segment, s.given = segment, 0.0
             s.given += actions[i]
             rewards[i] = compiled_dense_reward(
-                actions[i], s.given, ahead.target[i, segment], segment % 2 == 0,
-                bin_ + 1 == edges[segment + 1], tolerance,
+                actions[i], s.given, target[i, segment], segment % 2 == 0,
+                bin_ + 1 == edges[i, segment + 1], tolerance,
             )  # fmt: skip
     for i in outcome.done[: outcome.n_done]:
         rewards[i] = 0.0
@@ -362,28 +380,18 @@ def _longer(report: NDArray[np.int64], used: int, needed: int) -> NDArray[np.int
     return longer
 
 
-@compiled
-def _report(
-    report: NDArray[np.int64],
-    head: NDArray[np.int64],
-    first: int,
-    i: int,
-    edges: NDArray[np.int64],
-    target: NDArray[np.int64],
-    classes: NDArray[np.int64],
-) -> None:
-    """Report the presentations of environment `i` from `first` on; `head` says where."""
-    n = classes.size
-    for k in range(n):
-        report[first + k] = edges[2 * k + 1]
-        report[first + n + k] = classes[k]
-        report[first + 2 * n + k] = target[2 * k + 1]
-        report[first + 3 * n + k] = edges[2 * k + 2]
-    head[0] = i
-    for part in range(5):
-        head[1 + part] = first + part * n
-
-
 # Last, since a specialised function knows only what stands above it.
-step_drawn = specialise(step_trials, "drawn", begin_trials=begin_drawn)
-step_recorded = specialise(step_trials, "recorded", begin_trials=begin_recorded)
+begin_drawn = specialise(begin_trials, "drawn", fetch=_draw_trials, make_room=_draw_room)
+begin_recorded = specialise(begin_trials, "recorded", fetch=_hear_trials, make_room=_hear_room)
+step_drawn = specialise(
+    step_trials,
+    "drawn",
+    begin_trials=begin_drawn,
+    tell=specialise(tell, "drawn", report_trial=_report_drawn),
+)
+step_recorded = specialise(
+    step_trials,
+    "recorded",
+    begin_trials=begin_recorded,
+    tell=specialise(tell, "recorded", report_trial=_report_recorded),
+)

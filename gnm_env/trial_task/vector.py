@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.base.env import array_of
 from gnm_env.base.kernels import COST, DENSE, SIGN, Config, Episodes, Growing, growing_of
 from gnm_env.base.params import VectorParams, from_keywords, signature
 from gnm_env.base.vector import PatternVectorEnv, Step, read_only
 from gnm_env.checks import require_memory
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
-from gnm_env.trial_task.info import TerminalInfo, masked
+from gnm_env.trial_task.info import masked, terminal_info
 from gnm_env.trial_task.kernels import (
     TRIAL_STATE,
     Recorded,
@@ -24,12 +25,12 @@ from gnm_env.trial_task.kernels import (
     step_drawn,
     step_recorded,
 )
-from gnm_env.trial_task.params import TrialEnvParams
+from gnm_env.trial_task.params import HasTrialParams, TrialEnvParams
 
 FEEDBACK_NUMBER = {"cost": COST, "sign": SIGN, "dense": DENSE}
 
 
-class PatternTrialVectorEnv(PatternVectorEnv):
+class PatternTrialVectorEnv(HasTrialParams, PatternVectorEnv):
     """`gnm/PatternTrial-v0` many times over; see `PatternTrialEnv` for the task itself.
 
     Made by `gymnasium.make_vec("gnm/PatternTrial-v0", num_envs)`. Takes the arguments of the single
@@ -57,16 +58,14 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         params, vector = from_keywords((TrialEnvParams, VectorParams), given)
         self._graded = params.graded
         super().__init__(params, vector, params.action_space)
-        self.trials = params.trials
-        self.feedback, self.output = params.feedback, params.output
-        self.max_output, self.tolerance = params.max_output, params.tolerance
         n = self.num_envs
         records = np.zeros(n, TRIAL_STATE)
         records["anew"] = 1
         self._episodes = Episodes(records=records, emitted=np.zeros(n, self._amount_type()))
         self._source = params.task_arrays if self.trials is None else self._recorded()
+        self._tells_ends = self.trials is not None and self.trials.pattern_bins is None
         self._report = np.zeros(0, np.int64)
-        self._lists = ReusedRows(4, n)
+        self._lists = ReusedRows(3, n)
 
     def _recorded(self) -> Recorded:
         """The data set as the source of trials; its arrays are shared, not copied."""
@@ -108,14 +107,12 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         return self.task.background_bins + self.task.pattern_bins * most_presentations
 
     def _config(self) -> Config:
-        return (
-            super()
-            ._config()
-            ._replace(
-                most=self.max_output if self._graded else 1.0,
-                feedback=FEEDBACK_NUMBER[self.feedback],
-                tolerance=self.tolerance,
-            )
+        same = super()._config()
+        return same._replace(
+            most=self.max_output if self._graded else 1.0,
+            feedback=FEEDBACK_NUMBER[self.feedback],
+            tolerance=self.tolerance,
+            tells_ends=self._tells_ends,
         )
 
     def _new_state(self, growing: Growing) -> Any:
@@ -124,8 +121,8 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        if state["trials"] is not None:  # one data set, not two equal ones
-            state["_source"] = state["_source"]._replace(trials=state["trials"].arrays)
+        if state["_params"].trials is not None:  # one data set, not two equal ones
+            state["_source"] = state["_source"]._replace(trials=state["_params"].trials.arrays)
         super().__setstate__(state)
 
     def _reseeded(self, i: int) -> None:
@@ -146,10 +143,10 @@ class PatternTrialVectorEnv(PatternVectorEnv):
 
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
-        checked = np.asarray(actions)
-        if checked.shape != (self.num_envs, 1) or checked.dtype.kind not in "fiub":
+        checked = array_of(actions)
+        if checked.shape != (self._n, 1) or checked.dtype.kind not in "fiub":
             raise ValueError(
-                f"actions must be numbers of shape ({self.num_envs}, 1), one per environment, "
+                f"actions must be numbers of shape ({self._n}, 1), one per environment, "
                 f"got {checked.dtype} of shape {checked.shape}"
             )
         return np.ascontiguousarray(checked[:, 0], np.float64)
@@ -165,22 +162,38 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         if n_told == 0:  # truncated only
             return {}
         heads = self._outcome.heads[:n_told].tolist()
-        numbers = self._report[: heads[-1][-1]].tolist()
-        onsets, classes, targets, ends = self._lists.rows([head[0] for head in heads])
-        for i, first, second, third, fourth, end in heads:
+        numbers = (
+            self._report.tolist() if self._tells_ends else self._report[: heads[-1][-1]].tolist()
+        )
+        onsets, classes, targets = self._lists.rows([head[0] for head in heads])
+        for i, first, second, third, end in heads:
             onsets[i] = numbers[first:second]
             classes[i] = numbers[second:third]
-            targets[i] = numbers[third:fourth]
-            ends[i] = numbers[fourth:end]
-        onsets, classes, targets, ends = self._lists.lent()
-        results = self._outcome.results
-        told = TerminalInfo(
-            label=results.labels.copy(),
-            emitted=results.outputs.copy(),
-            onsets=onsets,
-            classes=classes,
-            targets=targets,
-            ends=ends,
-            pattern_bins=results.pattern_bins.copy(),
+            targets[i] = numbers[third:end]
+        onsets, classes, targets = self._lists.lent()
+        results = self._results
+        info = terminal_info(
+            results.labels.copy(),
+            results.outputs.copy(),
+            onsets,
+            classes,
+            targets,
+            results.pattern_bins.copy(),
         )
-        return masked(told, read_only(results.terminated), results.label_only)
+        masked(info, read_only(results.terminated))
+        if self.trials is not None:
+            self._add_extras(info, heads, numbers)
+        return info
+
+    def _add_extras(self, info: dict[str, Any], heads: list[Any], numbers: list[int]) -> None:
+        """What only trials of a data set tell: see `info_of`."""
+        results = self._results
+        if results.label_only.any():
+            info["label_only"] = results.label_only.copy()
+            info["_label_only"] = results.label_only.copy()
+        ends, mask = np.full(self._n, None, object), np.zeros(self._n, np.bool_)
+        for i, first, second, _, end in heads:
+            if second > first and results.pattern_bins[i] == 0:
+                ends[i], mask[i] = numbers[end : end + second - first], True
+        if mask.any():
+            info["ends"], info["_ends"] = ends, mask

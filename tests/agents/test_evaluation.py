@@ -22,7 +22,7 @@ from agents import (
     record,
 )
 from agents.neurons.neuron import Neuron
-from gnm_env import Patterns, Task, draw_trial
+from gnm_env import Patterns, Task, Trial, Trials, draw_trial
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, BUSY_WEIGHT
 from tests.gnm_env.reference import pieces
 
@@ -147,12 +147,12 @@ def test_a_list_of_one_is_still_a_list() -> None:
 
 def test_scoring_changes_nothing() -> None:
     agent = easy_agent()
-    agent.momentum[:] = 0.5
+    agent.velocity[:] = 0.5
     weights = agent.weights.copy()
     noisy_performance(agent, EASY, EASY_PATTERNS, 3, CAP)
     answers(agent, EASY, EASY_PATTERNS, trials=5)
     assert np.array_equal(agent.weights, weights)
-    assert (agent.momentum == 0.5).all()
+    assert (agent.velocity == 0.5).all()
 
 
 @pytest.mark.parametrize(
@@ -161,8 +161,8 @@ def test_scoring_changes_nothing() -> None:
         ({"runs": 0}, "runs must be >= 1, got 0"),
         ({"cap": 0}, "cap must be >= 1, got 0"),
         ({"seed": -1}, "seed must be >= 0, got -1"),
-        ({"threads": 0}, "threads must be >= 1, got 0"),
-        ({"threads": 0, "shared": False}, "threads must be >= 1, got 0"),
+        ({"threads": 0}, "threads must be in 1 … 1024, got 0"),
+        ({"threads": 0, "shared": False}, "threads must be in 1 … 1024, got 0"),
     ],
 )
 def test_numbers_out_of_range_are_refused(keywords: dict[str, Any], message: str) -> None:
@@ -210,7 +210,7 @@ def test_answers_are_those_that_recording_the_same_trials_shows() -> None:
     table, false_alarms, wrong, occurrences = counted_by_recording(agent)
     assert np.array_equal(result.table[0], table)
     assert result.table.sum(axis=2).tolist() == [occurrences]
-    assert result.false_alarms.tolist() == [false_alarms]
+    assert result.false_positives.tolist() == [false_alarms]
     assert result.wrong.tolist() == [wrong]
     assert result.trials == TRIALS
     assert result.noise_bins == TRIALS * BUSY.background_bins
@@ -225,7 +225,7 @@ def test_answers_of_several_agents_stand_in_their_order_whatever_their_kinds() -
     for b, agent in enumerate(agents):
         table, false_alarms, wrong, _ = counted_by_recording(agent)
         assert np.array_equal(result.table[b], table), b
-        assert result.false_alarms[b] == false_alarms
+        assert result.false_positives[b] == false_alarms
         assert result.wrong[b] == wrong
 
 
@@ -290,3 +290,101 @@ def test_the_bootstrap_interval_is_the_same_every_time_and_narrow_for_equal_valu
     irregular = np.random.default_rng(2).random(30)
     assert bootstrap_interval(irregular, seed=1) != bootstrap_interval(irregular, seed=2)
     assert bootstrap_interval([4.0] * 7) == (4.0, 4.0)
+
+
+def test_trials_of_which_only_labels_are_known_are_answered_too() -> None:
+    rule = AggregateLabel(fraction=1.0)
+    silent = NeuronAgent(GNM(), rule, n_inputs=3, initial_weight=0.0)
+    raster = np.ones((20, 3), np.bool_)
+    trials = Trials([Trial.from_dense(raster, label=k) for k in (0, 2, 1)])
+    result = answers(silent, trials)
+    assert result.table.shape[:2] == (1, 0)
+    assert result.wrong.tolist() == [2]
+    assert result.absolute.tolist() == [3.0]
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+
+class Answering:
+    """A policy that answers whatever it was made with."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def predict(self, *arguments: Any) -> Any:
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (3, "predict must return the actions and the state, got 3"),
+        ((np.array([7, 0]), None), "one action each, 0 or 1"),
+        ((np.array([np.nan, 0]), None), "one action each, 0 or 1"),
+        ((np.zeros(5), None), "predict must answer 2 streams with one action each"),
+    ],
+)
+def test_a_policy_that_answers_with_anything_but_spikes_is_refused(
+    answer: Any, message: str
+) -> None:
+    policy = Answering(answer)
+    with pytest.raises(ValueError, match=message):
+        noisy_performance(policy, EASY, EASY_PATTERNS, runs=2, cap=5)
+    with pytest.raises(ValueError, match=message):
+        answers(policy, EASY, EASY_PATTERNS, trials=2)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"runs": 10**12}, "runs must be at most 10,000,000"),
+        ({"cap": 10**30}, "cap must be at most 1,000,000,000"),
+        ({"shared": "no"}, "shared must be True or False, got 'no'"),
+        ({"seed": -1}, "seed must be >= 0"),
+    ],
+)
+def test_measurements_have_limits_that_are_said(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        noisy_performance(easy_agent(), EASY, EASY_PATTERNS, **keywords)
+    with pytest.raises(ValueError, match="trials must be at most 1,000,000,000,000"):
+        answers(easy_agent(), EASY, EASY_PATTERNS, trials=10**30)
+
+
+@pytest.mark.parametrize("values", [[], None, "x", [np.nan], [[1], [2, 3]], [np.inf], {}, 3, [1j]])
+def test_intervals_are_of_finite_numbers(values: Any) -> None:
+    with pytest.raises(ValueError, match="survived must be"):
+        mistake_rate(values)
+    with pytest.raises(ValueError, match="values must be"):
+        bootstrap_interval(values)
+
+
+@pytest.mark.parametrize("survived", [[-5], [1.5], [20_000]])
+def test_runs_survive_a_whole_number_of_bins_up_to_the_cap(survived: Any) -> None:
+    with pytest.raises(ValueError, match="survived must be whole numbers of bins in 0 … cap"):
+        mistake_rate(survived)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"resamples": 10**14}, "resamples must be at most 1,000,000,000"),
+        ({"resamples": 10**9}, "1,000,000,000 resamples of 1,000 values needs"),
+        ({"seed": "x"}, "seed must be a whole number"),
+        ({"seed": -1}, "seed must be >= 0"),
+    ],
+)
+def test_a_bootstrap_asks_for_memory_before_it_takes_it(
+    keywords: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        bootstrap_interval(np.arange(1_000), **keywords)
+
+
+@pytest.mark.parametrize("agent", [None, 3, GNM(), "x"])
+def test_a_recording_needs_an_agent_and_a_trial(agent: Any) -> None:
+    trial = draw_trial(EASY, EASY_PATTERNS, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="agent must be an agent, such as NeuronAgent makes"):
+        record(agent, trial)
+    with pytest.raises(ValueError, match=r"trial must be a gnm_env.Trial, got"):
+        record(easy_agent(), agent)

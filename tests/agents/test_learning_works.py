@@ -56,7 +56,7 @@ def test_modulated_error_traces_cannot_leave_silence() -> None:
     for trials in (100, 5_000):
         reached, agent = score(ErrorTrace(modulate=True), 1, 0, trials, start=0.0)
         assert not agent.weights.any()
-        assert not agent.momentum.any()
+        assert not agent.velocity.any()
     assert 100 < reached < 250
 
 

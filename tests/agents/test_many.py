@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-import time
+import signal
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,9 +10,10 @@ import numpy as np
 import pytest
 
 from agents import GNM, AggregateLabel, NeuronAgent, train, train_many
-from agents.many import lane_groups
 from agents.memory import bytes_needed
 from agents.policy import as_agent
+from agents.training.many import lane_groups
+from agents.training.source import Source, TaskSource
 from gnm_env import Patterns, Task
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, trial_env
 
@@ -43,10 +43,12 @@ def test_patterns_that_do_not_fit_the_task_are_refused() -> None:
 @pytest.mark.parametrize(
     ("keywords", "message"),
     [
-        ({"threads": 0}, "threads must be >= 1, got 0"),
+        ({"threads": 0}, "threads must be in 1 … 1024, got 0"),
         ({"threads": 1.5}, "threads must be a whole number, got 1.5"),
         ({"trials": -1}, "trials must be >= 0, got -1"),
         ({"block": 0}, "block must be >= 1, got 0"),
+        ({"seed": -1}, "seed must be >= 0, got -1"),
+        ({"seed": "one"}, "seed must be a whole number, got 'one'"),
     ],
 )
 def test_numbers_out_of_range_are_refused(keywords: dict[str, Any], message: str) -> None:
@@ -64,11 +66,10 @@ def test_the_loop_refuses_numbers_out_of_range_too(keywords: dict[str, Any], mes
 
 
 def test_agents_that_would_not_fit_into_memory_are_refused_before_anything_is_allocated() -> None:
-    task = Task(n_inputs=50_000_000, rate=1e-9, pattern_bins=1)
     weights = np.broadcast_to(0.1, 50_000_000)  # takes no room
     agents = [SimpleNamespace(weights=weights, group_key=None)] * 10_000
     with pytest.raises(ValueError, match=r"need 26,[\d,.]+ GiB, this machine has [\d,.]+"):
-        lane_groups(agents, task, None, 1)  # type: ignore[arg-type]
+        lane_groups(agents, TaskSource(BUSY, BUSY_PATTERNS), 1)
 
 
 def test_trials_that_would_not_fit_into_memory_are_refused_before_they_are_drawn(
@@ -81,7 +82,9 @@ def test_trials_that_would_not_fit_into_memory_are_refused_before_they_are_drawn
 
 
 def test_every_thread_counts_with_a_trial_of_its_own() -> None:
-    one, two = (bytes_needed(0, 64, Task(background_bins=10**6), threads) for threads in (1, 2))
+    task = Task(background_bins=10**6)
+    source = TaskSource(task, Patterns.draw(task, 0))
+    one, two = (bytes_needed(0, 64, source, threads) for threads in (1, 2))
     assert one == pytest.approx(64 * 14_000 + 532 * 1_000_100 + 2**22)
     assert two - one == pytest.approx(532 * 1_000_100)
 
@@ -111,7 +114,7 @@ def test_what_cannot_learn_is_refused(agent: Any, why: str) -> None:
 def test_threads_get_equally_many_units_and_every_agent_is_in_one(n_agents: int) -> None:
     agents = [busy_agent(seed) for seed in range(n_agents)]
     for threads in (1, 2, 3):
-        units = lane_groups(agents, BUSY, BUSY_PATTERNS, threads)
+        units = lane_groups(agents, TaskSource(BUSY, BUSY_PATTERNS), threads)
         places = [place for _, part in units for place in part]
         assert places == list(range(n_agents))
         assert len(units) < threads or len(units) % threads == 0
@@ -119,7 +122,7 @@ def test_threads_get_equally_many_units_and_every_agent_is_in_one(n_agents: int)
 
 def test_more_units_than_threads_change_no_bits() -> None:
     agents = [busy_agent(seed) for seed in range(1_100)]
-    assert len(lane_groups(agents, BUSY, BUSY_PATTERNS, threads=2)) > 2
+    assert len(lane_groups(agents, TaskSource(BUSY, BUSY_PATTERNS), threads=2)) > 2
     history = train_many(agents, BUSY, BUSY_PATTERNS, 40, seed=0, threads=2, block=20)
     together = [busy_agent(seed) for seed in range(1_100)]
     expected = train_many(together, BUSY, BUSY_PATTERNS, 40, seed=0, threads=1)
@@ -147,51 +150,58 @@ def test_no_trials_change_nothing() -> None:
 
 
 class FakeAgent:
-    """An agent whose lane group notes what is done to it."""
+    """An agent whose batch notes what is done to it."""
 
     n_inputs = BUSY.n_inputs
 
     def __init__(self, name: str, train: Any) -> None:
         self.name, self.train_ = name, train
-        self.training = threading.Event()
-        self.torn = False
+        self.trained = 0
         self.written = 0
 
     def group_key(self) -> str:
         return self.name
 
     @staticmethod
-    def lanes(agents: Any, task: Task, patterns: Patterns) -> Any:
+    def batch(agents: Any, source: Source) -> Any:
         agent = agents[0]
 
-        class Group:
-            def train(self, rng: Any, trials: int) -> Any:
-                agent.training.set()
-                try:
-                    agent.train_()
-                finally:
-                    agent.training.clear()
+        class Batch:
+            def train(self, rng: Any, ahead: Any, trials: int) -> Any:
+                agent.train_()
+                agent.trained += trials
                 return np.zeros(1, np.int64), np.zeros(1)
 
             def write_back(self) -> None:
-                agent.torn |= agent.training.is_set()
-                agent.written += 1
+                agent.written = agent.trained
 
             def overflowed(self) -> Any:
                 return np.full(1, -1)
 
-        return Group()
+        return Batch()
 
 
-def test_an_interrupt_writes_back_what_was_learned_once_every_thread_has_ended_its_block() -> None:
-    def interrupted() -> None:
-        raise KeyboardInterrupt
+@pytest.mark.parametrize("interrupts", [1, 3])
+def test_interrupts_wait_until_every_agent_stands_at_the_same_trial(interrupts: int) -> None:
+    def interrupt() -> None:
+        for _ in range(interrupts):
+            signal.raise_signal(signal.SIGINT)
 
-    agents = [FakeAgent("quick", interrupted), FakeAgent("slow", lambda: time.sleep(0.2))]
+    agents = [FakeAgent("quick", lambda: None), FakeAgent("slow", interrupt)]
+    histories: list[Any] = []
     with pytest.raises(KeyboardInterrupt):
-        train_many(agents, BUSY, BUSY_PATTERNS, 10, seed=0)
-    assert [agent.written for agent in agents] == [1, 1]
-    assert not any(agent.torn for agent in agents)
+        train_many(
+            agents, BUSY, BUSY_PATTERNS, 100, seed=0, block=10, threads=1,
+            callback=lambda done, history: histories.append(history),
+        )  # fmt: skip
+    assert [agent.written for agent in agents] == [10, 10]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_one_agent_twice_is_refused() -> None:
+    agent = busy_agent()
+    with pytest.raises(ValueError, match="agent 2 is agent 0 again"):
+        train_many([agent, busy_agent(1), agent], BUSY, BUSY_PATTERNS, 10)
 
 
 def test_an_exception_in_a_callback_keeps_what_was_learned() -> None:

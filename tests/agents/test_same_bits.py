@@ -103,7 +103,7 @@ def alone(neuron: str, rule: str, lane: int = 0, seed: int = 9) -> tuple[NeuronA
 
 def assert_same(one: NeuronAgent, other: NeuronAgent) -> None:
     assert np.array_equal(one.weights, other.weights)
-    assert np.array_equal(one.momentum, other.momentum)
+    assert np.array_equal(one.velocity, other.velocity)
     assert one.overflowed == other.overflowed
 
 
@@ -158,12 +158,6 @@ def test_agents_of_different_kinds_keep_their_places_and_their_bits(threads: int
         by_itself, its_history = alone(neuron, rule, lane)
         assert_same(agents[lane], by_itself)
         assert_same_history(history.of(lane), its_history)
-
-
-def test_a_list_that_names_an_agent_twice_trains_it_once() -> None:
-    agent = agent_of("gnm", "all")
-    train_many([agent, agent], BUSY, BUSY_PATTERNS, TRIALS, seed=9)
-    assert_same(agent, alone("gnm", "all")[0])
 
 
 # --- in pieces -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,7 @@ STARTING = 300.0
 class Worker:
     """One process; begun anew after each case that ended it."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
-        self._environment = environment
+    def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
 
     def run(self, number: int, timeout: float) -> tuple[str, str]:
@@ -51,7 +50,6 @@ class Worker:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**os.environ, **self._environment},
             start_new_session=True,
         )
         if self._answer(STARTING) != "ready":
@@ -87,15 +85,18 @@ def run_cases(
     numbers: Iterable[int],
     jobs: int,
     timeout: float,
-    environment: dict[str, str] | None = None,
+    told: Callable[[dict[int, tuple[str, str]]], None] | None = None,
 ) -> dict[int, tuple[str, str]]:
-    """What became of each of the cases of `inputs.cases()`, by number."""
+    """What became of each of the cases of `inputs.cases()`, by number.
+
+    `told` is called every minute with what is known so far.
+    """
     waiting = list(numbers)[::-1]
     results: dict[int, tuple[str, str]] = {}
     lock = threading.Lock()
 
     def serve() -> None:
-        worker = Worker(environment or {})
+        worker = Worker()
         try:
             while True:
                 with lock:
@@ -109,6 +110,10 @@ def run_cases(
     threads = [threading.Thread(target=serve) for _ in range(jobs)]
     for thread in threads:
         thread.start()
+    last = time.monotonic()
     while any(thread.is_alive() for thread in threads):
         time.sleep(0.05)
+        if told is not None and time.monotonic() - last > 60:
+            last = time.monotonic()
+            told(dict(results))
     return dict(sorted(results.items()))

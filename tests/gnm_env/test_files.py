@@ -297,6 +297,7 @@ def test_what_another_file_is_is_said(tmp_path: Path) -> None:
         (tmp_path / "missing", "there is no checkpoint .*missing"),
         (tmp_path / ("x" * 300), "too long"),
         (Path("/dev/null"), "it is no regular file"),
+        (Path("zero\0byte"), "null byte"),
     ):
         with pytest.raises(ValueError, match=message):
             read_arrays(path, SPECS, what="checkpoint")

@@ -34,6 +34,7 @@ TASKS = {
     "silent": Task(rate=0.0),
     "saturated": Task(rate=1.0, n_inputs=5, pattern_bins=4, background_bins=6),
     "no occurrences": Task(mean_occurrences=0.0),
+    "rates": Task(n_inputs=5, rates=(0.3, 0.0, 0.05, 0.6, 0.01), pattern_bins=4, n_classes=2),
     "jitter": Task(n_classes=2, jitter_bins=3, rate=0.02),
     "deletion": Task(n_classes=2, deletion=0.3, rate=0.02),
     "jitter and deletion": Task(n_inputs=20, rate=0.2, pattern_bins=6, jitter_bins=9, deletion=0.5),

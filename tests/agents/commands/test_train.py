@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
+import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +18,7 @@ import pytest
 
 from agents import load_checkpoint
 from agents.commands import evaluate, show, train
-from agents.commands.terminal import parse
+from agents.commands.terminal import Stopped, parse
 
 SCRIPTS = Path(__file__).resolve().parents[3] / "scripts"
 
@@ -83,12 +86,12 @@ def test_resumed_training_ends_as_an_uninterrupted_one(tmp_path: Path) -> None:
     trained(tmp_path / "rest", "--trials", "100", "--resume", checkpoint)
     whole, rest = (load_checkpoint(tmp_path / x / "agent.npz") for x in ("whole", "rest"))
     assert np.array_equal(whole.agent.weights, rest.agent.weights)
-    assert np.array_equal(whole.agent.momentum, rest.agent.momentum)
+    assert np.array_equal(whole.agent.velocity, rest.agent.velocity)
 
 
-def test_interrupted_training_saves_what_there_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def stops_at_100(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C once 100 trials are done."""
     real = train.train_many
 
     def interrupted(*args: Any, callback: Any, **settings: Any) -> Any:
@@ -100,13 +103,98 @@ def test_interrupted_training_saves_what_there_is(
         return real(*args, callback=stop, **settings)
 
     monkeypatch.setattr(train, "train_many", interrupted)
-    result = trained(tmp_path / "run")
-    assert result["stopped"] and 100 <= result["trials"] < 300
-    assert "go on with --resume" in capsys.readouterr().out
+
+
+def test_a_training_that_is_stopped_keeps_what_was_learned(
+    tmp_path: Path, stops_at_100: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(Stopped, match="go on with --resume") as told:
+        trained(tmp_path / "run")
+    trials = told.value.result["trials"]
+    assert told.value.result["stopped"] and 100 <= trials < 300
+    assert told.value.result["checkpoint"] == str(tmp_path / "run" / "agent.npz")
     monkeypatch.undo()
-    trained(tmp_path / "whole", "--trials", str(result["trials"]))
+    trained(tmp_path / "whole", "--trials", str(trials))
     saved, whole = (load_checkpoint(tmp_path / x / "agent.npz") for x in ("run", "whole"))
     assert np.array_equal(saved.agent.weights, whole.agent.weights)
+
+
+def test_a_training_that_is_stopped_leaves_a_finished_one_alone(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path, stops_at_100: None
+) -> None:
+    folder = shutil.copytree(run[0], tmp_path / "copy")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(Stopped, match=r"agent\.npz is as it was"):
+        trained(folder, "--seed", "7")
+    after = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    assert after == before
+    assert load_checkpoint(folder / "unfinished" / "agent.npz").task is not None
+
+
+def test_a_training_that_is_killed_leaves_the_old_agent_and_its_last_checkpoint(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    folder = shutil.copytree(run[0], tmp_path / "copy")
+    before = (folder / "agent.npz").read_bytes()
+    words = ["--out", folder, "--checkpoint-every", "0", "--trials", "100000000"]
+    process = subprocess.Popen([sys.executable, SCRIPTS / "train.py", *map(str, words)])
+    try:
+        while not (folder / "unfinished" / "agent.npz").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+    finally:
+        process.kill()
+        process.wait()
+    assert (folder / "agent.npz").read_bytes() == before
+    resumed = trained(folder, "--resume", str(folder / "unfinished" / "agent.npz"))
+    assert not resumed["stopped"] and not (folder / "unfinished").exists()
+
+
+def test_sigterm_ends_as_ctrl_c_does_and_the_last_line_says_what_was_kept(tmp_path: Path) -> None:
+    words = ["--out", tmp_path, "--checkpoint-every", "0", "--trials", "100000000", "--json"]
+    process = subprocess.Popen(
+        [sys.executable, SCRIPTS / "train.py", *map(str, words)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while not (tmp_path / "unfinished" / "agent.npz").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.terminate()
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    told = json.loads(out.splitlines()[-1])
+    assert told["stopped"] and told["checkpoint"] == str(tmp_path / "agent.npz")
+    assert re.match(
+        r"train\.py: stopped; kept what was learned in [\d,]+ trials", err.splitlines()[-1]
+    )
+    assert load_checkpoint(tmp_path / "agent.npz").rng is not None
+
+
+def test_a_terminal_without_our_letters_does_not_fail_a_finished_training(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, SCRIPTS / "train.py", "--trials", "50", "--out", tmp_path],
+        capture_output=True, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert b"95 % interval" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--alpha", ".9"),
+        ("--n-classes", "2"),
+        ("--seed", "0"),
+        ("--neuron", "lif"),
+        ("--modulate",),
+    ],
+)
+def test_options_that_resuming_would_ignore_are_refused(
+    run: tuple[Path, dict[str, Any]], words: tuple[str, ...], tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=f"{words[0]} does not go with --resume"):
+        trained(tmp_path, "--resume", str(run[0] / "agent.npz"), *words)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -119,12 +207,11 @@ def test_interrupted_training_saves_what_there_is(
         (("--neuron", "mst", "--tau-s", "30"), "tau_s must be smaller than tau_m"),
         (("--tau-m", "9"), "--tau-m belongs to --neuron mst"),
         (("--modulate",), "--modulate belongs to --learner et"),
-        (("--neuron", "network", "--learner", "all"), "does not go with --learner all"),
+        (("--neuron", "network", "--learner", "all"), "network does not go with the rule all"),
         (("--learner", "bp"), "backpropagation needs the network's hidden layer"),
         (("--neuron", "lif", "--time", "continuous"), "only the GNM has differential equations"),
         (("--weight-bounds", "1", "0"), "weight_bounds must be (lowest, highest)"),
         (("--weight-bounds", "some"), "takes two numbers"),
-        (("--trials", "0"), "--trials must be >= 1"),
         (("--resume", "nowhere.npz"), "there is no checkpoint nowhere.npz"),
     ],
 )

@@ -57,7 +57,7 @@ def test_the_loop_and_the_compiled_trainer_end_with_the_same_bits(rule: Rule, et
     slow = train(looped, graded(), trials=12, seed=3)
     fast = train_many(others, TASK, PATTERNS, trials=12, seed=3)
     assert np.array_equal(looped.weights, others[1].weights)
-    assert np.array_equal(looped.momentum, others[1].momentum)
+    assert np.array_equal(looped.velocity, others[1].velocity)
     assert not np.array_equal(looped.weights, make(rule, eta=eta).weights)
     np.testing.assert_allclose(slow.mean_error, fast.mean_error[:, 1], rtol=1e-12)
     assert slow.error_rate.tolist() == fast.error_rate[:, 1].tolist()
@@ -184,7 +184,9 @@ def test_a_copy_with_another_alpha_keeps_the_weights() -> None:
 
 
 def test_spiking_neurons_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"neuron must be a ContinuousGNM.*NeuronAgent"):
+    with pytest.raises(
+        ValueError, match=r"neuron must be one of ContinuousGNM.*NeuronAgent is the agent for it"
+    ):
         ContinuousAgent(GNM(), RULES[0], TASK.n_inputs)
 
 
@@ -248,7 +250,7 @@ def test_answers_are_rounded_sums() -> None:
         false_alarms += np.rint(in_noise(trial, S)).sum()
     assert np.array_equal(found.table[0], table)
     assert found.wrong[0] == wrong
-    assert found.false_alarms[0] == false_alarms
+    assert found.false_positives[0] == false_alarms
 
 
 def test_wrong_outputs_are_missed_occurrences_and_false_alarms() -> None:

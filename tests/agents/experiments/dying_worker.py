@@ -14,6 +14,7 @@ from typing import Any
 from distributed import LocalCluster
 
 from agents.experiments.design import Block
+from agents.experiments.journal import read_journal
 from agents.experiments.sweep import sweep
 from agents.experiments.workers import cluster
 from tests.agents.experiments import toys
@@ -23,6 +24,18 @@ def counted(folder: str, block: Block) -> Any:
     """Leave a note, then work."""
     (Path(folder) / f"{block.number}-{os.getpid()}").touch()
     return toys.work(block)
+
+
+def kill_at_work(pid: int, notes: Path, folder: Path) -> bool:
+    """Kill the worker if it has begun exactly one block that is not in the store yet."""
+    if not folder.exists():
+        return False
+    os.kill(pid, signal.SIGSTOP)
+    begun = {int(note.name.partition("-")[0]) for note in notes.glob(f"*-{pid}")}
+    finished = set(read_journal(folder).blocks)
+    at_work = len(begun) > 1 and len(begun - finished) == 1
+    os.kill(pid, signal.SIGKILL if at_work else signal.SIGCONT)
+    return at_work
 
 
 def main(folder: Path) -> None:
@@ -39,9 +52,8 @@ def main(folder: Path) -> None:
         pids = {worker.process.pid for worker in local.workers.values()}
 
         def kill_one() -> None:
-            while len(list(notes.iterdir())) < 5:
+            while not kill_at_work(min(pids), notes, folder):
                 threading.Event().wait(0.02)
-            os.kill(min(pids), signal.SIGKILL)
 
         threading.Thread(target=kill_one).start()
         sweep(toys.toy(pause=0.2, compute=compute), folder, executor)

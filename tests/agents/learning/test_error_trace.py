@@ -67,7 +67,7 @@ def test_weights_follow_the_error_trace(
         E = reference.error_trace(spikes, above, trial.onsets, trial.targets, trial.pattern_bins)
         signal = E * expected.V if modulate else E
         change = LAMBDA * reference.eligibilities(raster, kernel, signal)
-        np.testing.assert_allclose(agent.momentum, change, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(agent.velocity, change, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(agent.weights, weights + change, rtol=1e-9)
 
         in_noise = trial.owner() < 0
@@ -100,33 +100,33 @@ def test_a_trial_whose_sum_is_right_but_whose_timing_is_not_does_teach() -> None
     agent = agent_with(ErrorTrace(LAMBDA))
     assert play(agent, trial).sum() == trial.label == 1
     # α = 1: a spike's trace is one bin long, and that bin holds E = −1.
-    assert agent.momentum.tolist() == [0.0, -LAMBDA]
+    assert agent.velocity.tolist() == [0.0, -LAMBDA]
 
     by_label = agent_with(AggregateLabel(LAMBDA, fraction=0.5))
     play(by_label, trial)
-    assert not by_label.momentum.any()
+    assert not by_label.velocity.any()
 
 
 def test_every_noise_bin_above_threshold_counts_not_only_the_crossing() -> None:
     agent = agent_with(ErrorTrace(LAMBDA))
     spikes = play(agent, quiet_trial([2, 3, 4, 11]))
     assert np.flatnonzero(spikes).tolist() == [2, 11]
-    assert agent.momentum.tolist() == [0.0, -3 * LAMBDA]
+    assert agent.velocity.tolist() == [0.0, -3 * LAMBDA]
 
 
 def test_exactly_at_threshold_is_an_error_in_noise() -> None:
     agent = agent_with(ErrorTrace(LAMBDA))
     agent.weights = [0.0, 1.0]
     play(agent, quiet_trial([2, 11]))
-    assert agent.momentum.tolist() == [0.0, -LAMBDA]
+    assert agent.velocity.tolist() == [0.0, -LAMBDA]
 
 
 def test_nothing_changes_where_every_answer_is_right_the_momentum_included() -> None:
     agent = agent_with(ErrorTrace(LAMBDA))
-    agent.momentum[:] = 0.5
+    agent.velocity[:] = 0.5
     play(agent, quiet_trial([11]))
     assert agent.weights.tolist() == [0.0, 2.0]
-    assert agent.momentum.tolist() == [0.5, 0.5]
+    assert agent.velocity.tolist() == [0.5, 0.5]
 
 
 def test_modulated_it_learns_nothing_from_a_potential_of_zero_but_plain_it_does() -> None:
@@ -146,7 +146,7 @@ def test_occurrences_that_touch_are_told_apart() -> None:
     raster[[6, 12], [1, 0]] = True
     agent = agent_with(ErrorTrace(LAMBDA))
     play(agent, Trial.from_dense(raster, [5, 10], [0, 0], TASK))
-    assert agent.momentum.tolist() == [LAMBDA, 0.0]
+    assert agent.velocity.tolist() == [LAMBDA, 0.0]
 
 
 def test_whether_to_modulate_must_be_true_or_false() -> None:

@@ -45,32 +45,32 @@ def learner(bounds: tuple[float, float] | None = (0.0, 0.9), momentum: float = 0
 def test_the_previous_change_is_added_with_its_own_momentum_and_is_kept_unclipped() -> None:
     agent = learner()
     play(agent, MORE)
-    assert agent.momentum.tolist() == [0.0, 0.25]
+    assert agent.velocity.tolist() == [0.0, 0.25]
     assert agent.weights.tolist() == [0.0, 0.75]
     play(agent, MORE)
-    assert agent.momentum[1] == 0.25 + 0.2 * 0.25
+    assert agent.velocity[1] == 0.25 + 0.2 * 0.25
     assert agent.weights[1] == 0.9  # the bound
     play(agent, MORE)
-    assert agent.momentum[1] == 0.25 + 0.2 * (0.25 + 0.2 * 0.25)
+    assert agent.velocity[1] == 0.25 + 0.2 * (0.25 + 0.2 * 0.25)
     assert agent.weights[1] == 0.9
 
 
 def test_momentum_carries_inputs_that_are_not_eligible_themselves() -> None:
     agent = learner()
-    agent.momentum[:] = [0.5, -0.5]
+    agent.velocity[:] = [0.5, -0.5]
     play(agent, MORE)
-    assert agent.momentum.tolist() == [0.2 * 0.5, 0.25 + 0.2 * -0.5]
+    assert agent.velocity.tolist() == [0.2 * 0.5, 0.25 + 0.2 * -0.5]
     assert agent.weights.tolist() == [0.1, 0.5 + 0.15]
 
 
 def test_momentum_is_left_alone_by_trials_that_teach_nothing() -> None:
     agent = learner()
     play(agent, MORE)
-    before = agent.momentum.copy()
+    before = agent.velocity.copy()
     play(agent, MORE, label=0, targets=[0])
-    assert np.array_equal(agent.momentum, before)
+    assert np.array_equal(agent.velocity, before)
     play(agent, MORE)
-    assert agent.momentum[1] == 0.25 + 0.2 * 0.25
+    assert agent.velocity[1] == 0.25 + 0.2 * 0.25
 
 
 def test_momentum_lives_across_calls_and_checkpoints(tmp_path: Path) -> None:
@@ -80,14 +80,14 @@ def test_momentum_lives_across_calls_and_checkpoints(tmp_path: Path) -> None:
     again = NeuronAgent.load(tmp_path / "agent")
     for each in (agent, again):
         play(each, MORE)
-        assert each.momentum[1] == 0.25 + 0.2 * 0.25
+        assert each.velocity[1] == 0.25 + 0.2 * 0.25
 
 
 def test_without_momentum_each_change_stands_alone() -> None:
     agent = learner(momentum=0.0)
     play(agent, MORE)
     play(agent, MORE)
-    assert agent.momentum[1] == 0.25
+    assert agent.velocity[1] == 0.25
 
 
 @pytest.mark.parametrize(
@@ -148,9 +148,9 @@ def test_a_weight_that_would_overflow_ends_learning_and_keeps_its_last_finite_va
     for agent in (looped, lane):
         assert agent.overflowed
         assert np.isfinite(agent.weights).all()
-        assert np.isfinite(agent.momentum).all()
+        assert np.isfinite(agent.velocity).all()
     assert np.array_equal(looped.weights, lane.weights)
-    assert np.array_equal(looped.momentum, lane.momentum)
+    assert np.array_equal(looped.velocity, lane.velocity)
     # Both name the trial itself, not the block in which it lay.
     assert 0 <= int(by_loop.overflowed) < 50
     assert by_lane.overflowed.tolist() == [int(by_loop.overflowed)]

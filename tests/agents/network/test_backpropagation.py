@@ -42,8 +42,8 @@ def test_a_learning_step_is_the_slope_of_the_objective(name: str, rule: str) -> 
             continue  # so steep that finite differences do not resolve it
         play(agent, trial)
         scale = np.abs(expected).max()
-        np.testing.assert_allclose(agent.momentum, expected, rtol=1e-5, atol=1e-7 * scale + 1e-9)
-        assert np.array_equal(agent.weights, weights + agent.momentum)
+        np.testing.assert_allclose(agent.velocity, expected, rtol=1e-5, atol=1e-7 * scale + 1e-9)
+        assert np.array_equal(agent.weights, weights + agent.velocity)
         checked += scale > 0
     assert checked > 0, "the trials should teach something"
 
@@ -62,7 +62,7 @@ def test_the_two_settings_of_the_error_trace_make_a_difference(rule: str) -> Non
     assert len({trace.tobytes() for trace in traces.values()}) == len(RULES)
     expected = slope(agent.network, trial.dense(), agent.weights, traces[rule])
     play(agent, trial)
-    np.testing.assert_allclose(agent.momentum, expected, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(agent.velocity, expected, rtol=1e-5, atol=1e-7)
 
 
 def test_the_gradient_runs_through_the_inhibition() -> None:
@@ -71,7 +71,7 @@ def test_the_gradient_runs_through_the_inhibition() -> None:
     agent.hidden_weights, agent.output_weights = 0.8, [1.0, 0.0]
     task = Task(n_inputs=1, pattern_bins=6)
     play(agent, Trial.from_dense(np.ones((8, 1)), [0], [0], task))
-    change = agent.momentum[:2]
+    change = agent.velocity[:2]
     assert change[0] * change[1] < 0
 
 
@@ -88,8 +88,8 @@ def test_without_a_hidden_layer_it_is_error_trace_learning_to_the_last_bit(momen
     train_many([network], BUSY, BUSY_PATTERNS, 400, seed=2)
     train_many([neuron], BUSY, BUSY_PATTERNS, 400, seed=2)
     assert np.array_equal(network.weights, neuron.weights)
-    assert np.array_equal(network.momentum, neuron.momentum)
-    assert np.abs(network.momentum).max() > 0
+    assert np.array_equal(network.velocity, neuron.velocity)
+    assert np.abs(network.velocity).max() > 0
 
 
 def test_each_layer_has_its_own_learning_rate() -> None:
@@ -101,19 +101,19 @@ def test_each_layer_has_its_own_learning_rate() -> None:
     play(plain, trial)
     play(agent, trial)
     split = 3 * BUSY.n_inputs
-    np.testing.assert_allclose(agent.momentum[:split], 0.5 * plain.momentum[:split])
-    np.testing.assert_allclose(agent.momentum[split:], 0.25 * plain.momentum[split:])
-    assert (np.abs(plain.momentum) > 0).any()
+    np.testing.assert_allclose(agent.velocity[:split], 0.5 * plain.velocity[:split])
+    np.testing.assert_allclose(agent.velocity[split:], 0.25 * plain.velocity[split:])
+    assert (np.abs(plain.velocity) > 0).any()
 
 
 def test_a_step_adds_a_fraction_of_the_step_before_it() -> None:
     trial = draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1))
     agent = gradient_learner(Network(hidden=3), BUSY.n_inputs, momentum=0.4)
     fresh = gradient_learner(Network(hidden=3), BUSY.n_inputs)
-    agent.momentum[:] = before = np.random.default_rng(0).normal(size=len(agent.weights))
+    agent.velocity[:] = before = np.random.default_rng(0).normal(size=len(agent.weights))
     play(agent, trial)
     play(fresh, trial)
-    np.testing.assert_allclose(agent.momentum, fresh.momentum + 0.4 * before, rtol=1e-12)
+    np.testing.assert_allclose(agent.velocity, fresh.velocity + 0.4 * before, rtol=1e-12)
 
 
 @pytest.mark.parametrize("fraction", [0.999, 1.001, 1e-3])
@@ -123,32 +123,32 @@ def test_a_step_longer_than_allowed_keeps_its_direction_and_gets_the_allowed_len
     trial = draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1))
     free = gradient_learner(Network(hidden=3), BUSY.n_inputs)
     play(free, trial)
-    length = np.linalg.norm(free.momentum)
+    length = np.linalg.norm(free.velocity)
     held = gradient_learner(Network(hidden=3), BUSY.n_inputs, max_step=fraction * length)
     play(held, trial)
-    assert np.linalg.norm(held.momentum) == pytest.approx(min(fraction, 1.0) * length)
-    np.testing.assert_allclose(held.momentum, min(fraction, 1.0) * free.momentum, rtol=1e-12)
+    assert np.linalg.norm(held.velocity) == pytest.approx(min(fraction, 1.0) * length)
+    np.testing.assert_allclose(held.velocity, min(fraction, 1.0) * free.velocity, rtol=1e-12)
 
 
 def test_a_step_is_shortened_before_momentum_is_added_and_however_long_it_is() -> None:
     agent = NetworkAgent(
         Network(hidden=3), BackPropagation(1e200, 1e200, max_step=0.1), BUSY.n_inputs
     )
-    agent.momentum[:] = before = np.random.default_rng(0).normal(size=len(agent.weights))
+    agent.velocity[:] = before = np.random.default_rng(0).normal(size=len(agent.weights))
     agent.weights = 2.0
     play(agent, draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1)))
-    assert np.linalg.norm(agent.momentum - 0.2 * before) == pytest.approx(0.1)
+    assert np.linalg.norm(agent.velocity - 0.2 * before) == pytest.approx(0.1)
     assert not agent.overflowed
 
 
 def test_a_trial_without_error_changes_nothing_momentum_included() -> None:
     agent = NetworkAgent(n_inputs=BUSY.n_inputs, initial_weight=0.0)
-    agent.momentum[:] = 1.0
+    agent.velocity[:] = 1.0
     weights = agent.weights.copy()
     raster = np.zeros((20, BUSY.n_inputs))
     play(agent, Trial.from_dense(raster, [], [], BUSY))
     assert np.array_equal(agent.weights, weights)
-    assert (agent.momentum == 1.0).all()
+    assert (agent.velocity == 1.0).all()
 
 
 def test_a_pattern_that_ends_the_trial_is_counted() -> None:
@@ -165,7 +165,7 @@ def test_a_pattern_that_ends_the_trial_is_counted() -> None:
     assert crossings(layers.V, 1.0)[onsets[-1] :].any(), "the last occurrence should have a spike"
     expected = slope(agent.network, raster, agent.weights, E)
     play(agent, trial)
-    np.testing.assert_allclose(agent.momentum, expected, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(agent.velocity, expected, rtol=1e-5, atol=1e-7)
 
 
 @pytest.mark.parametrize("loop", ["train", "train_many"])
@@ -179,7 +179,7 @@ def test_a_weight_that_would_overflow_ends_learning_and_nothing_is_lost(loop: st
             history = train_many([agent], BUSY, BUSY_PATTERNS, 50, seed=1, block=10).of(0)
     assert agent.overflowed
     assert np.isfinite(agent.weights).all()
-    assert np.isfinite(agent.momentum).all()
+    assert np.isfinite(agent.velocity).all()
     assert 0 <= history.overflowed < 50
     weights = agent.weights.copy()
     play(agent, draw_trial(BUSY, BUSY_PATTERNS, np.random.default_rng(1)))

@@ -68,7 +68,7 @@ def test_gradients_are_those_of_the_compiled_network(name: str, rule: str, devic
     for trial in trials:
         agent = gradient_learner(network, BUSY.n_inputs, 2, **RULES[rule])
         play(agent, trial)
-        expected += agent.momentum
+        expected += agent.velocity
     module = NetworkModule.from_agent(start, device=device)
     found = gradient(module, trials, start.rule)
     scale = np.abs(expected).max()
@@ -89,8 +89,8 @@ def test_gradients_agree_on_full_size_trials(classes: int) -> None:
         module = NetworkModule.from_agent(agent)
         found = gradient(module, [trial], agent.rule)
         play(agent, trial)
-        assert np.abs(agent.momentum).max() > 1
-        np.testing.assert_allclose(found, agent.momentum, rtol=0, atol=1e-9)
+        assert np.abs(agent.velocity).max() > 1
+        np.testing.assert_allclose(found, agent.velocity, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -48,7 +48,7 @@ def alone(lane: int = 0, hidden: int | None = 4) -> tuple[NetworkAgent, History]
 
 def assert_same(one: NetworkAgent, other: NetworkAgent) -> None:
     assert np.array_equal(one.weights, other.weights)
-    assert np.array_equal(one.momentum, other.momentum)
+    assert np.array_equal(one.velocity, other.velocity)
     assert one.overflowed == other.overflowed
 
 
@@ -78,10 +78,12 @@ def test_networks_and_neurons_are_trained_side_by_side_and_each_ends_as_alone(th
         assert np.array_equal(history.of(lane + 1).error_rate, its_history.error_rate)
 
 
-def test_the_feedback_of_the_environment_changes_nothing() -> None:
+def test_feedback_on_the_way_changes_nothing_and_the_sign_alone_is_refused() -> None:
     agent = busy_network()
-    train(agent, trial_env(feedback="sign"), TRIALS, seed=9)
+    train(agent, trial_env(feedback="dense"), TRIALS, seed=9)
     assert_same(agent, alone()[0])
+    with pytest.raises(ValueError, match="BackPropagation needs to know where the presentations"):
+        train(agent, trial_env(feedback="sign"), 1, seed=9)
 
 
 def test_going_on_from_a_checkpoint_ends_where_one_uninterrupted_run_ends(tmp_path: Path) -> None:
@@ -119,7 +121,7 @@ def test_a_checkpoint_whose_parts_do_not_fit_is_refused(tmp_path: Path) -> None:
     agent = busy_network()
     agent._weights = agent._weights[:1]
     agent.save(tmp_path / "agent")
-    with pytest.raises(ValueError, match="weights must have shape"):
+    with pytest.raises(ValueError, match="weights and velocity must have length 52"):
         NetworkAgent.load(tmp_path / "agent")
 
 
@@ -186,7 +188,7 @@ def test_answers_are_the_spikes_counted_in_each_trial() -> None:
             false_alarms += spikes[owner < 0].sum()
             wrong += spikes.sum() != trial.label
         assert found.table[lane].tolist() == table.tolist()
-        assert (found.false_alarms[lane], found.wrong[lane]) == (false_alarms, wrong)
+        assert (found.false_positives[lane], found.wrong[lane]) == (false_alarms, wrong)
         assert false_alarms > 0
         assert (table[:, 1:].sum(axis=1) > 0).all()
     assert (found.noise_bins, found.trials) == (40 * BUSY.background_bins, 40)

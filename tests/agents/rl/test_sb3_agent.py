@@ -15,8 +15,9 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, train_many
-from agents.policy import PolicyLanes
+from agents.policy import PolicyBatch
 from agents.rl import RAW, TRACES, SB3Agent, Senses, make_rl_agent
+from agents.training.source import TaskSource
 from gnm_env import Patterns, Task
 from gnm_env.wrappers import SeededEpisodes
 
@@ -73,7 +74,8 @@ def test_a_neuron_scores_the_same_in_evaluate_policy_as_in_noisy_performance():
     )
     assert noisy_performance(neuron, TASK, PATTERNS, runs=10, seed=70).tolist() == returns
     assert (
-        PolicyLanes(neuron, TASK, PATTERNS).survive_streams(70, 10, 10_000)[0].tolist() == returns
+        PolicyBatch(neuron, TaskSource(TASK, PATTERNS)).survive_streams(70, 10, 10_000)[0].tolist()
+        == returns
     )
 
 

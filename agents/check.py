@@ -1,0 +1,98 @@
+"""Whether a neuron or a rule of one's own works at every width: tried, and told in plain words."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from agents.learning.aggregate_label import AggregateLabel
+from agents.learning.rule import Rule
+from agents.neuron_agent import NeuronAgent
+from agents.neurons.gnm import GNM
+from agents.neurons.neuron import Neuron
+from agents.training.agent import Agent
+from agents.training.loop import train
+from agents.training.many import train_many
+from gnm_env.task import Patterns, Task
+from gnm_env.trial import Trial
+from gnm_env.trial_task.env import PatternTrialEnv
+
+WIDTHS = (1, 8, 32)
+"""Numbers of neurons side by side for which loops are compiled."""
+
+_TASK = Task(n_inputs=12, pattern_bins=8, rate=0.15, background_bins=20, n_classes=2)
+_TRIALS = 60
+
+
+def check_neuron(neuron: Any) -> None:
+    """Try `neuron` alone and side by side, at widths 1, 8 and 32; returns if all is well.
+
+    Raises:
+        ValueError: in a sentence that says what is wrong: a line that cannot serve neurons side by
+            side, other bits at another width, or a state of zeros that is not rest.
+    """
+    if not isinstance(neuron, Neuron):
+        raise ValueError(
+            f"neuron must be an instance of a class derived from Neuron, got {neuron!r}"
+        )
+    _check_parameters(neuron)
+    _check_rest(neuron)
+    _check_widths(neuron, AggregateLabel(1e-2, fraction=0.25))
+
+
+def check_rule(rule: Any, neuron: Any = None) -> None:
+    """Try `rule` on `neuron` (None: a GNM) as `check_neuron` does; returns if all is well."""
+    if not isinstance(rule, Rule):
+        raise ValueError(f"rule must be an instance of a class derived from Rule, got {rule!r}")
+    _check_widths(GNM() if neuron is None else neuron, rule)
+
+
+def _check_parameters(neuron: Neuron) -> None:
+    names, numbers = neuron.parameters_type._fields, neuron.parameters()
+    if len(names) != len(numbers):
+        raise ValueError(
+            f"parameters() of {type(neuron).__name__} must give one number for each of "
+            f"{', '.join(names)}, got {len(numbers)}"
+        )
+    if not np.isfinite([n for n in numbers if not np.isinf(n)]).all():
+        raise ValueError(f"parameters() of {type(neuron).__name__} must be numbers, got {numbers}")
+    if not dataclasses.is_dataclass(neuron):
+        raise ValueError(
+            f"{type(neuron).__name__} must be a frozen dataclass: @dataclass(frozen=True)"
+        )
+
+
+def _check_rest(neuron: Neuron) -> None:
+    """A neuron that hears nothing stays at rest: V = 0 and no spikes."""
+    silence = Trial.from_dense(np.zeros((20, _TASK.n_inputs), bool), [], [], _TASK)
+    agent = NeuronAgent(neuron, AggregateLabel(fraction=0.25), _TASK.n_inputs)
+    recording = agent.record(silence)
+    if recording.spikes.any() or recording.V.any():
+        raise ValueError(
+            f"a {type(neuron).__name__} that hears nothing must stay at rest, V = 0 and no spikes, "
+            "since every trial begins with a state of zeros; count what is not 0 at rest as the "
+            "distance from there"
+        )
+
+
+def _check_widths(neuron: Neuron, rule: Rule) -> None:
+    patterns = Patterns.draw(_TASK, 0)
+
+    def agents(n: int) -> list[Agent]:
+        weight = 3 * neuron.default_initial_weight
+        return [NeuronAgent(neuron, rule, _TASK.n_inputs, k, weight) for k in range(n)]
+
+    alone = agents(1)[0]
+    train(alone, PatternTrialEnv(_TASK, patterns), _TRIALS, seed=1)
+    for width in WIDTHS:
+        group = agents(width)
+        train_many(group, _TASK, patterns, _TRIALS, seed=1, threads=1)
+        same = np.array_equal(group[0].weights, alone.weights, equal_nan=True)
+        if not same:
+            raise ValueError(
+                f"{type(neuron).__name__} with {type(rule).__name__} ends with other weights "
+                f"among {width} side by side than in the standard loop: everything that passes "
+                "from bin to bin must be in its State, and nothing in a global"
+            )

@@ -1,0 +1,44 @@
+"""What numba says of code that it cannot compile, in a sentence that names the line."""
+
+from __future__ import annotations
+
+import linecache
+import re
+from pathlib import Path
+from typing import Any
+
+_OURS = Path(__file__).resolve().parent.parent
+_PLACE = re.compile(r'File "([^"]+)", line (\d+)')
+_REASONS = (
+    (r"function truth", "a condition of many neurons has no one truth value"),
+    (r"Cannot unify .* for '(\w+)[.\d]*'", "the name {0} has values of two kinds"),
+    (r"Unknown attribute '(\w+)'", "there is no {0}"),
+    (r"name '(\w+)' is not defined", "the name {0} is not known"),
+    (r"Untyped global name '(\w+)'", "{0} is not compiled: decorate it with gnm_env.compiled"),
+    (r">>> ([\w.]+)\(", "{0} does not take what it is given here"),
+)
+"""Patterns in what numba says, the most telling first, and what they mean."""
+
+
+def explained(error: Exception, *parts: Any) -> ValueError:
+    """A ValueError that says which line of the classes of `parts` cannot be compiled, and why."""
+    text = re.sub(r"\x1b\[\d+m", "", str(error))
+    where = "a step, teaching signal or rule"
+    for file, line in reversed(_PLACE.findall(text)):
+        path = Path(file) if Path(file).is_absolute() else Path.cwd() / file
+        if (
+            path.is_file()
+            and not path.resolve().is_relative_to(_OURS)
+            and "numba" not in path.parts
+        ):
+            source = linecache.getline(str(path), int(line)).strip()
+            where = f"{file}, line {line}, `{source}`"
+            break
+    found = ((re.search(pattern, text), words) for pattern, words in _REASONS)
+    reasons = (words.format(*match.groups()) for match, words in found if match)
+    reason = next(reasons, next(line for line in text.splitlines() if "Failed in" not in line))
+    names = ", ".join(type(part).__name__ for part in parts)
+    return ValueError(
+        f"{names}: {where} cannot be compiled for neurons side by side: {reason}; "
+        "agents.simd lists what a step may use"
+    )
