@@ -108,7 +108,9 @@ def _loops(key: Key) -> Any:
     explore_bin = None
     if key.rule.explore is not None:
         names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
-        everything["explore_trial"] = specialise(explore_trial_template, together, **names)
+        everything["explore_trial"] = specialise(
+            explore_trial_template, together, inline=True, **names
+        )
         explore_bin = specialise(explore_bin_template, together, **names)
     return SimpleNamespace(
         explore_bin=explore_bin,
