@@ -36,6 +36,7 @@ from agents.neurons.lif import LIF
 from agents.neurons.mst import MST
 from agents.plotting import plot
 from agents.recording import Recording, record
+from agents.trained import pretrained
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
 from agents.training.many import train_many
@@ -73,6 +74,7 @@ __all__ = [
     "mistake_rate",
     "noisy_performance",
     "plot",
+    "pretrained",
     "record",
     "train",
     "train_many",
