@@ -25,6 +25,7 @@ from agents.recording import Recording, record
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
 from agents.training.many import train_many
+from agents.watching import play
 
 __all__ = [
     "GNM",
@@ -46,6 +47,7 @@ __all__ = [
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",
+    "play",
     "plot",
     "record",
     "train",

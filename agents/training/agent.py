@@ -166,6 +166,15 @@ class Agent:
         put("velocity", values, self._velocity)
 
     @property
+    def potential(self) -> float:
+        """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
+
+        Divided by `model.threshold` it is what an environment's `potential` takes for its pictures.
+        """
+        assert self._heard is not None
+        return float(self._heard.V[self._bin - 1, 0]) if self._bin else 0.0
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest weight; infinite where there is no bound."""
         return self._weight_bounds or (-np.inf, np.inf)
