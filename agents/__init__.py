@@ -40,6 +40,7 @@ from agents.trained import pretrained
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
 from agents.training.many import train_many
+from agents.watching import play
 
 __all__ = [
     "GNM",
@@ -73,6 +74,7 @@ __all__ = [
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",
+    "play",
     "plot",
     "pretrained",
     "record",

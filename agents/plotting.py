@@ -150,7 +150,7 @@ def plot(agent: Any, task: Task, patterns: Patterns, history: History | None = N
         0 and by what it owes, (b) readout with its threshold and the output spikes, or for an agent
         in continuous time the bins that give S, (c) with `history` the learning curve.
     """
-    trial = _shown_trial(task, patterns)
+    trial = shown_trial(task, patterns)
     heights = (1.3, 1, 1)[: 2 + (history is not None)]
     with styled():
         import matplotlib.pyplot as plt
@@ -244,8 +244,8 @@ def _model(agent: Any) -> Any:
     return agent.neuron if hasattr(agent, "neuron") else agent.network
 
 
-def _shown_trial(task: Task, patterns: Patterns, seed: int = 7) -> Trial:
-    """A trial with every class in it, of ordinary length, for a picture."""
+def shown_trial(task: Task, patterns: Patterns, seed: int = 7) -> Trial:
+    """A trial with every class in it, of ordinary length, for a picture; `seed` chooses it."""
     rng = np.random.default_rng(seed)
     trial = draw_trial(task, patterns, rng)
     wanted = min(task.n_classes, 4)

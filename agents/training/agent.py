@@ -192,6 +192,7 @@ class Agent:
         put("velocity", values, self._velocity)
 
     @property
+<<<<<<< HEAD
     def momentum(self) -> NDArray[np.float64]:
         """The former name of `velocity`. (The factor μ is the rule's: `agent.rule.momentum`.)"""
         return self._velocity
@@ -208,6 +209,15 @@ class Agent:
     @rule_memory.setter
     def rule_memory(self, values: ArrayLike) -> None:
         put("rule_memory", values, self._rule_memory)
+=======
+    def potential(self) -> float:
+        """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
+
+        Divided by `model.threshold` it is what an environment's `potential` takes for its pictures.
+        """
+        assert self._heard is not None
+        return float(self._heard.V[self._bin - 1, 0]) if self._bin else 0.0
+>>>>>>> explorer
 
     @property
     def bounds(self) -> tuple[float, float]:
