@@ -192,7 +192,6 @@ class Agent:
         put("velocity", values, self._velocity)
 
     @property
-<<<<<<< HEAD
     def momentum(self) -> NDArray[np.float64]:
         """The former name of `velocity`. (The factor μ is the rule's: `agent.rule.momentum`.)"""
         return self._velocity
@@ -209,7 +208,8 @@ class Agent:
     @rule_memory.setter
     def rule_memory(self, values: ArrayLike) -> None:
         put("rule_memory", values, self._rule_memory)
-=======
+
+    @property
     def potential(self) -> float:
         """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
 
@@ -217,7 +217,6 @@ class Agent:
         """
         assert self._heard is not None
         return float(self._heard.V[self._bin - 1, 0]) if self._bin else 0.0
->>>>>>> explorer
 
     @property
     def bounds(self) -> tuple[float, float]:
