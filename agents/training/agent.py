@@ -425,8 +425,7 @@ class Agent:
 
     def _checked(self, obs: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.int8]:
         """`obs` as contiguous bits of this shape."""
-        if type(obs) is not np.ndarray or obs.dtype != np.int8 or not obs.flags.c_contiguous:
-            obs = _bits(obs)
+        obs = bits_of(obs)
         if obs.shape != shape:
             raise ValueError(
                 f"an observation must have shape {shape} (n_inputs = {self._n_inputs}), "
@@ -571,8 +570,10 @@ def _require_numbers(model: Model) -> None:
         )
 
 
-def _bits(obs: Any) -> NDArray[np.int8]:
-    """Observations of another type as int8; ValueError unless they are 0 and 1."""
+def bits_of(obs: Any) -> NDArray[np.int8]:
+    """Observations as contiguous int8; ValueError unless they are 0 and 1 (int8 is believed)."""
+    if type(obs) is np.ndarray and obs.dtype == np.int8 and obs.flags.c_contiguous:
+        return obs
     array = _array(obs)
     if array.dtype.kind not in "fiub" or not np.isin(array, (0, 1)).all():
         raise ValueError(

@@ -192,7 +192,7 @@ class ForeignTraceback(Exception):
 
 
 def cases() -> list[Case]:
-    """All bad inputs, some 1,200, in a fixed order."""
+    """All bad inputs, some 3,200, in a fixed order."""
     made = [
         *_parameters(), *_task_and_patterns(), *_trials(), *_environments(), *_steps(),
         *_wrappers(), *_agents(), *_learning(), *_predict(), *_running(), *_files(), *_rl(),
@@ -1261,8 +1261,7 @@ def _rl() -> list[Case]:
     made: list[Case] = []
     own = "agents/rl/sb3_agent.py"
     head = (
-        "from agents.rl.sb3_agent import SB3Agent\nfrom agents.rl import senses\n"
-        "Senses = getattr(senses, 'Senses', None) or senses.ObservationConfig\n"
+        "from agents.rl import ObservationConfig, SB3Agent\n"
         "class P:\n    def predict(self, o, s=None, e=None, d=True): return np.zeros(len(o), int), s\n"
     )
 
@@ -1312,7 +1311,7 @@ def _rl() -> list[Case]:
             "rising_edge=None",
             "bogus=1",
         ],
-        "Senses(«»)",
+        "ObservationConfig(«»)",
     )
     return _fine(made, "np.zeros(4, object)", "P(), task, None", "predict(np.zeros((1, 4)))")
 
