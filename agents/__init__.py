@@ -14,30 +14,58 @@ from agents.evaluation import (
     noisy_performance,
 )
 from agents.history import History
-from agents.learning.aggregate_label import AggregateLabel
-from agents.learning.error_trace import ErrorTrace
+from agents.learning import (
+    MPDAL,
+    MSTDPET,
+    PSD,
+    SPAN,
+    STDP,
+    AggregateLabel,
+    Chronotron,
+    CriticalThreshold,
+    ErrorTrace,
+    PeakError,
+    PolicyGradient,
+    ReSuMe,
+    SurrogateGradient,
+    Tempotron,
+)
 from agents.neuron_agent import NeuronAgent
 from agents.neurons.gnm import GNM
 from agents.neurons.lif import LIF
 from agents.neurons.mst import MST
 from agents.plotting import plot
 from agents.recording import Recording, record
+from agents.trained import pretrained
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
 from agents.training.many import train_many
+from agents.watching import play
 
 __all__ = [
     "GNM",
     "LIF",
+    "MPDAL",
     "MST",
+    "MSTDPET",
+    "PSD",
+    "SPAN",
+    "STDP",
     "AggregateLabel",
     "Answers",
     "Checkpoint",
+    "Chronotron",
+    "CriticalThreshold",
     "ErrorTrace",
     "History",
     "MistakeRate",
     "NeuronAgent",
+    "PeakError",
+    "PolicyGradient",
+    "ReSuMe",
     "Recording",
+    "SurrogateGradient",
+    "Tempotron",
     "WeightOverflow",
     "answers",
     "bootstrap_interval",
@@ -46,7 +74,9 @@ __all__ = [
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",
+    "play",
     "plot",
+    "pretrained",
     "record",
     "train",
     "train_many",

@@ -14,16 +14,20 @@ import numpy as np
 
 from agents.history import History
 from agents.recording import record
-from gnm_env import Patterns, Task, Trial, draw_trial
+from gnm_env import Patterns, Task, Trial, colours, draw_trial
+from gnm_env.colours import MISTAKE, as_hex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CLASS_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Okabe and Ito's colours, told apart by the colour-blind: one for each class, then from the first
-again."""
-OUTPUT = CLASS_COLOURS[1]
+OUTPUT = as_hex(MISTAKE)
+"""Output spikes, and what is given of S: the colour that no class has."""
+OKABE_ITO = {
+    "blue": "#0072B2", "vermillion": "#D55E00", "green": "#009E73", "purple": "#CC79A7",
+    "orange": "#E69F00", "sky": "#56B4E9", "black": "#000000", "grey": "#999999",
+}  # fmt: skip
+"""For what is no class, such as learners: told apart by the colour-blind."""
 RED, BLUE, GREY, INK = "#c1121f", "#3a6ea5", "#8a8a8a", "#222222"
 METHOD_COLOURS = (GREY, INK, BLUE, "#1b998b", RED)
 """For up to five methods side by side; their marks differ as well."""
@@ -99,7 +103,7 @@ def silent_line(axes: Axes, score: float) -> None:
 
 def class_colour(class_: int) -> str:
     """The colour of a class, counted from 0."""
-    return CLASS_COLOURS[class_ % len(CLASS_COLOURS)]
+    return as_hex(colours.class_colour(class_))
 
 
 def shade(axes: Axes, trial: Trial) -> None:
@@ -146,7 +150,7 @@ def plot(agent: Any, task: Task, patterns: Patterns, history: History | None = N
         0 and by what it owes, (b) readout with its threshold and the output spikes, or for an agent
         in continuous time the bins that give S, (c) with `history` the learning curve.
     """
-    trial = _shown_trial(task, patterns)
+    trial = shown_trial(task, patterns)
     heights = (1.3, 1, 1)[: 2 + (history is not None)]
     with styled():
         import matplotlib.pyplot as plt
@@ -227,7 +231,7 @@ def draw_learning_curve(axes: Axes, history: History) -> None:
     """Fraction of trials answered wrongly, and the mean error."""
     axes.plot(history.trials, history.error_rate, color="black", label="trials answered wrongly")
     axes.plot(
-        history.trials, history.mean_error, color=CLASS_COLOURS[0], ls="--",
+        history.trials, history.mean_error, color=class_colour(0), ls="--",
         label="mean |label − emitted| (spikes)",
     )  # fmt: skip
     axes.set(xlabel="trials", ylabel="error", ylim=(0, None), xlim=(0, None))
@@ -240,8 +244,8 @@ def _model(agent: Any) -> Any:
     return agent.neuron if hasattr(agent, "neuron") else agent.network
 
 
-def _shown_trial(task: Task, patterns: Patterns, seed: int = 7) -> Trial:
-    """A trial with every class in it, of ordinary length, for a picture."""
+def shown_trial(task: Task, patterns: Patterns, seed: int = 7) -> Trial:
+    """A trial with every class in it, of ordinary length, for a picture; `seed` chooses it."""
     rng = np.random.default_rng(seed)
     trial = draw_trial(task, patterns, rng)
     wanted = min(task.n_classes, 4)

@@ -7,16 +7,17 @@ Two kinds of pages are written anew at every build, from the code itself, and ke
 from __future__ import annotations
 
 import sys
-import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "extensions"), str(HERE.parent)]
 
+import gnm_env  # noqa: E402
+
 project = "gnm-env"
 author = "The gnm-env contributors"
 copyright = "The gnm-env contributors, MIT licence"
-release = tomllib.loads((HERE.parent / "pyproject.toml").read_text())["project"]["version"]
+release = gnm_env.__version__
 version = release
 
 extensions = [
@@ -40,6 +41,9 @@ myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 4
 # Gallery pages hold links with a scheme; everything else without one is a page or a file of ours.
 myst_url_schemes = ["http", "https", "mailto"]
+
+# Two classes may have a field of one name, such as `channels`: its mention is no link then.
+suppress_warnings = ["ref.python"]
 
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"

@@ -18,6 +18,9 @@ from gnm_env.task import Patterns, Task
 WINDOW = 200
 """Bins that a frame shows; the newest is on the right."""
 
+MOST_POTENTIAL = 1e9
+"""Potentials beyond this, in thresholds, are drawn here."""
+
 Picture = NDArray[np.uint8]
 
 # Layout in pixels.
@@ -97,7 +100,8 @@ class Scroll:
         wrong = output > 0 and too_many(given, owed)
         new: tuple[Any, ...] = (obs_row, shade, output, wrong, potential)
         histories = (self._inputs, self._tints, self._outputs, self._wrong, self._potentials)
-        for history, value in zip(histories, new, strict=True):
+        pairs: Any = zip(histories, new, strict=True)
+        for history, value in pairs:
             history[:-1] = history[1:]
             history[-1] = value
         self._n_bins += 1
@@ -212,7 +216,7 @@ class Scroll:
         if known.size == 0:
             return
         area = picture[top : top + POTENTIAL_HEIGHT, LEFT : LEFT + PLOT_WIDTH]
-        values = self._potentials[known]
+        values = np.clip(self._potentials[known], -MOST_POTENTIAL, MOST_POTENTIAL)
         high = _power_of_two(max(2.0, values.max()))
         low = -_power_of_two(max(0.5, -values.min())) if values.min() < 0 else 0.0
         area[:] = WHITE

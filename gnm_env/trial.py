@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
+from gnm_env.batches import draw_batch, new_batch
 from gnm_env.binning import binned, warn_of_merged
 from gnm_env.checks import (
     MAX_BINS,
@@ -442,7 +443,16 @@ def draw_trial(task: Task, patterns: Patterns, rng: Generator) -> Trial:
     background bin chosen uniformly; T = background_bins + M·Σ k_c. The environments draw the same
     trials from the same generator.
     """
-    return draw_next(task, task_arrays(task, patterns), Generators([generator("rng", rng)]))
+    numbers = task_arrays(task, patterns)
+    batch, _, n_bins = draw_batch(generator("rng", rng), numbers, 0, 1, new_batch(512))
+    channels, offsets, edges, target, classes, _, edge_of, *_ = batch
+    end = edge_of[1]
+    offsets = offsets[: n_bins + 1].copy()
+    arrays = TrialArrays(
+        channels[: offsets[-1]].copy(), offsets, edges[:end].copy(), target[: end - 1].copy()
+    )
+    which = classes[1 : end - 1 : 2].copy()
+    return Trial._trusted(arrays, which, task.n_inputs, task.pattern_bins)
 
 
 def draw_next(task: Task, numbers: TaskArrays, generators: Generators) -> Trial:

@@ -16,7 +16,7 @@ from gnm_env.task import TaskArrays
 MAX_TRIALS = 100_000_000
 """Most trials of a data set."""
 
-BATCH_BINS = 4_096
+BATCH_BINS = 16_384
 """`lay_out` lays trials one behind the other until this many bins are there."""
 
 

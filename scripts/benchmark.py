@@ -27,16 +27,17 @@ from tqdm import tqdm
 import benchmarks  # noqa: F401  before NumPy
 
 # isort: split
-from agents.checkpoint import atomic_write
 from agents.commands import terminal
 from agents.commands.terminal import Parser, at_least
 from benchmarks.report import page, summary, table
 from benchmarks.rows import Findings
+from gnm_env.files import atomic_write
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 SECTIONS: dict[str, tuple[str, ...]] = {
     "training": ("training:side_by_side",),
+    "rules": ("training:rules",),
     "alone": ("training:alone",),
     "network": ("training:network",),
     "continuous": ("training:continuous",),

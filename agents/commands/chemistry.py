@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import bootstrap_interval
-from agents.checkpoint import atomic_write
 from agents.chemistry import Course, ReactionNetwork, Reactor, antimony, sbml
 from agents.chemistry.mistakes import MOLECULES, Mistakes, count_mistakes
 from agents.chemistry.network import CONVERSION
@@ -28,6 +27,7 @@ from agents.experiments.progress import Progress
 from agents.experiments.reactions import given, traced_trial
 from agents.plotting import save
 from gnm_env import Trial
+from gnm_env.files import atomic_write
 
 
 def options(parser: Parser) -> None:
@@ -64,7 +64,7 @@ class Responses:
     Attributes:
         deterministic: with infinitely many molecules.
         shown: for each number of molecules the first stochastic run.
-        S: float64 (runs, K) for each number of molecules, S of each occurrence in each run.
+        S: float64 (runs, K) for each number of molecules, S of each presentation in each run.
     """
 
     deterministic: Course

@@ -21,21 +21,15 @@ from typing import Any
 import numpy as np
 
 from agents import History, load_checkpoint, plot, train, train_many
-from agents.checkpoint import atomic_write
 from agents.commands import fields
 from agents.commands.output import Output
 from agents.commands.scoring import report, score
 from agents.commands.terminal import Parser, Stopped, at_least, share
-from agents.experiments.models import (
-    default_rule,
-    neuron_class,
-    neurons,
-    new_agent,
-    rule_class,
-    rules,
-)
+from agents.experiments.models import default_rule, new_agent
 from agents.experiments.progress import Progress
+from agents.registry import find_model, find_rule, networks, neurons, rules
 from gnm_env import Patterns, Task
+from gnm_env.files import atomic_write
 
 AGENT = "agent.npz"
 _YOURS = "or your own as module:Class or file.py:Class"
@@ -44,7 +38,7 @@ _YOURS = "or your own as module:Class or file.py:Class"
 def options(parser: Parser) -> None:
     add = parser.add_argument
     # fmt: off
-    add("--neuron", metavar="NAME", help=f"{', '.join(neurons())}, {_YOURS} (default gnm)")
+    add("--neuron", metavar="NAME", help=f"{', '.join(_models())}, {_YOURS} (default gnm)")
     add("--learner", metavar="NAME",
         help=f"{', '.join(rules())}, {_YOURS} (default all; bp for the network)")
     add("--time", choices=("discrete", "continuous"),
@@ -64,16 +58,21 @@ def options(parser: Parser) -> None:
         help="go on from a saved agent, its task, its patterns and its place in the stream")
     add("--checkpoint-every", type=float, default=60.0, metavar="SECONDS",
         help="save the agent so often while it learns (default 60; 0: in every block of trials)")
+    share(parser, "--import")
     share(parser, "--out", default=Path("runs/train"))
-    fields.add_options(parser, {"the task": Task, **_models(parser)})
+    fields.add_options(parser, {"the task": Task, **_groups(parser)})
     # fmt: on
 
 
-def _models(parser: Parser) -> dict[str, type]:
+def _models() -> dict[str, type]:
+    return neurons() | networks()
+
+
+def _groups(parser: Parser) -> dict[str, type]:
     """The classes of all neurons and rules, and of those that the command line names."""
-    found = {f"--neuron {name}": cls for name, cls in neurons().items()}
+    found = {f"--neuron {name}": cls for name, cls in _models().items()}
     found |= {f"--learner {name}": cls for name, cls in rules().items()}
-    for option, find in (("--neuron", neuron_class), ("--learner", rule_class)):
+    for option, find in (("--neuron", find_model), ("--learner", find_rule)):
         spec = parser.early(option)
         if spec and ":" in spec:
             found[f"{option} {spec}"] = find(spec)
@@ -101,15 +100,19 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
         "trials": trials,
         "seconds": time.monotonic() - began,
         "checkpoint": str(options.out / AGENT),
-        "picture": str(options.out / "training.png"),
+        "picture": None,
         "stopped": False,
     }
-    plot(agent, task, patterns, history).savefig(output.fresh / "training.png")
+    try:
+        plot(agent, task, patterns, history).savefig(output.fresh / "training.png")
+        result["picture"] = str(options.out / "training.png")
+    except ImportError as error:
+        print(f"no picture: {error}\n")
     with atomic_write(output.fresh / "score.json") as file:
         file.write(json.dumps(result, indent=2).encode())
     output.finish()
     print(report(result))
-    print(f"\nin {options.out}: {AGENT}, learning_curve.csv, score.json and training.png")
+    print(f"\nin {options.out}: {', '.join(sorted(path.name for path in options.out.iterdir()))}")
     return result
 
 
@@ -162,8 +165,8 @@ def _chosen(options: argparse.Namespace) -> tuple[type, type]:
                 "only the GNM has differential equations here"
             )
         neuron = "continuous"
-    cls = neuron_class(neuron)
-    return cls, rule_class(options.learner or default_rule(cls))
+    cls = find_model(neuron)
+    return cls, find_rule(options.learner or default_rule(cls))
 
 
 def _bounds(words: Sequence[str]) -> tuple[float, float] | None:

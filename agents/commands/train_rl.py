@@ -27,7 +27,6 @@ from typing import Any
 
 import torch
 
-from agents.checkpoint import atomic_write
 from agents.commands import fields
 from agents.commands.output import Output
 from agents.commands.scoring import report, score
@@ -46,6 +45,7 @@ from agents.rl.checkpoint import (
 from agents.rl.hyperparameters import n_parameters
 from agents.rl.trust import require_trust
 from gnm_env import Patterns, Task
+from gnm_env.files import atomic_write
 
 EVALUATIONS = "evaluations.npz"
 STEPS = {1: 2_000_000, 2: 8_000_000}

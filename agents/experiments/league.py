@@ -18,15 +18,7 @@ from numpy.typing import NDArray
 
 from agents import noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
-from agents.experiments.methods import (
-    GNM_ALL,
-    GNM_ET,
-    GNM_ET_MODULATED,
-    LIF_ALL,
-    MODULATED,
-    MST_ALL,
-)
-from agents.experiments.models import neuron_class, rule_class
+from agents.experiments.methods import LIF_ALL, MODULATED, MST_ALL
 from agents.experiments.statistics import mean, median
 from agents.experiments.store import read
 from agents.experiments.training import (
@@ -36,7 +28,8 @@ from agents.experiments.training import (
     pattern_seeds,
     training_seed,
 )
-from agents.plotting import BINS, CLASS_COLOURS
+from agents.plotting import BINS, OKABE_ITO
+from agents.registry import find_model, find_rule
 from gnm_env import Patterns, PatternStreamEnv, Task
 from gnm_env.sampling import append_piece, new_buffers
 from gnm_env.task import task_arrays
@@ -63,20 +56,20 @@ CLASSES = {"quick": (1,), "full": (1, 2)}
 FIRST_SEED = 100
 """None of these pattern seeds was used when the settings of the RL agents were chosen."""
 
-_TRIALS = {"trials": 60_000}
-_LIF_ET, _MST_ET = {**LIF_ALL, "rule": "et"}, {**MST_ALL, "rule": "et"}
+_PARAMETERS: dict[str, Setting] = {"GNM": {"neuron": "gnm"}, "LIF": LIF_ALL, "MST": MST_ALL}
+_RULE: dict[str, Setting] = {
+    "ALL": {"rule": "all"},
+    "ET": {"rule": "et"},
+    "ET modulated": MODULATED,
+}
 
 NEURON_LEARNERS: dict[str, Setting] = {
-    "GNM, ALL": {**GNM_ALL, **_TRIALS},
-    "GNM, ET": {**GNM_ET, **_TRIALS},
-    "GNM, ET modulated": {**GNM_ET_MODULATED, **_TRIALS},
-    "LIF, ALL": {**LIF_ALL, **_TRIALS},
-    "LIF, ET": {**_LIF_ET, **_TRIALS},
-    "LIF, ET modulated": {**LIF_ALL, **MODULATED, **_TRIALS},
-    "MST, ALL": {**MST_ALL, **_TRIALS},
-    "MST, ET": {**_MST_ET, **_TRIALS},
-    "MST, ET modulated": {**MST_ALL, **MODULATED, **_TRIALS},
-    "network, BP": {"neuron": "network", "rule": "bp", **_TRIALS},
+    **{
+        f"{neuron}, {rule}": {**_PARAMETERS[neuron], **_RULE[rule], "trials": 60_000}
+        for neuron in _PARAMETERS
+        for rule in _RULE
+    },
+    "network, BP": {"neuron": "network", "rule": "bp", "trials": 60_000},
     "silent": {"reference": "silent"},
     "random spikes": {"reference": "random"},
     "oracle": {"reference": "oracle"},
@@ -148,9 +141,9 @@ def league(
 def _protocol(part: str) -> dict[str, Any]:
     """Every default that the settings leave out, and how seeds become streams."""
     if part == "neurons":
-        kinds = [neuron_class(name) for name in ("gnm", "lif", "mst")]
-        kinds += [rule_class(name) for name in ("all", "et")]
-        kinds += [neuron_class("network"), rule_class("bp")]
+        kinds: list[Any] = [find_model(name) for name in ("gnm", "lif", "mst")]
+        kinds += [find_rule(name) for name in ("all", "et")]
+        kinds += [find_model("network"), find_rule("bp")]
         defaults = {kind.name: asdict(kind()) for kind in kinds}
     else:
         from agents.rl import HYPERPARAMETERS
@@ -283,29 +276,19 @@ def _rl_agent(setting: Setting, sheet: ScoreSheet) -> int:
     return n_parameters(model)
 
 
-class Silent:
-    """Never spikes."""
+class RandomSpikes:
+    """Spikes in each bin with one probability, whatever it hears; 0 is silence."""
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.int64], None]:  # fmt: skip
-        """0 everywhere."""
-        return np.zeros(len(observation), np.int64), None
-
-
-class RandomSpikes(Silent):
-    """Spikes in one bin of a hundred, whatever it hears."""
-
-    def __init__(self, seed: int) -> None:
-        self._rng = np.random.default_rng(seed)
+    def __init__(self, probability: float, seed: int = 0) -> None:
+        self._probability, self._rng = probability, np.random.default_rng(seed)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[np.int64], None]:  # fmt: skip
         """Independent coins."""
-        return (self._rng.random(len(observation)) < 0.01).astype(np.int64), None
+        spikes = self._rng.random(len(observation)) < self._probability
+        return spikes.astype(np.int64), None
 
 
 def _reference(setting: Setting, sheet: ScoreSheet) -> int:
@@ -316,8 +299,8 @@ def _reference(setting: Setting, sheet: ScoreSheet) -> int:
         told = [_oracle(sheet.task, sheet.patterns, seed, setting["cap"]) for seed in seeds]
         sheet.enter(FINAL, np.array(told), 0, 0.0)
     else:
-        policy = Silent() if name == "silent" else RandomSpikes(setting["pattern_seed"])
-        sheet.score(FINAL, policy, 0, 0.0)
+        probability = 0.0 if name == "silent" else 0.01
+        sheet.score(FINAL, RandomSpikes(probability, setting["pattern_seed"]), 0, 0.0)
     return 0
 
 
@@ -332,7 +315,7 @@ def _oracle(task: Task, patterns: Patterns, seed: int, cap: int) -> int:
 
 
 def _right_answers(task: Task, patterns: Patterns, seed: int) -> Iterator[int]:
-    """0 in noise; in an occurrence the spikes owed, one a bin from its first bin on."""
+    """0 in noise; in a presentation the spikes owed, one a bin from its first bin on."""
     rng, numbers, noise_left = np.random.default_rng(seed), task_arrays(task, patterns), -1.0
     channels, offsets = new_buffers()[:2]
     while True:
@@ -352,31 +335,29 @@ CAP = 10_000
 
 
 class Style(NamedTuple):
-    """How a learner is drawn: colours of Okabe and Ito, told apart in grey by dashes and marks."""
+    """How a learner is drawn; told apart in grey by dashes and marks."""
 
     colour: str
     dashes: str
     mark: str
 
 
-STYLES = {
-    "GNM, ALL": Style(CLASS_COLOURS[0], "-", "o"),
-    "GNM, ET": Style(CLASS_COLOURS[0], ":", "o"),
-    "GNM, ET modulated": Style(CLASS_COLOURS[0], "--", "o"),
-    "LIF, ALL": Style(CLASS_COLOURS[5], "-", "s"),
-    "LIF, ET": Style(CLASS_COLOURS[5], ":", "s"),
-    "LIF, ET modulated": Style(CLASS_COLOURS[5], "--", "s"),
-    "MST, ALL": Style(CLASS_COLOURS[2], "-", "^"),
-    "MST, ET": Style(CLASS_COLOURS[2], ":", "^"),
-    "MST, ET modulated": Style(CLASS_COLOURS[2], "--", "^"),
-    "network, BP": Style("#000000", "-", "D"),
-    "PPO, cost": Style(CLASS_COLOURS[1], "-", "o"),
-    "PPO, dense": Style(CLASS_COLOURS[1], "--", "o"),
-    "PPO linear, cost": Style(CLASS_COLOURS[4], "-", "s"),
-    "RecurrentPPO, cost": Style(CLASS_COLOURS[3], "-", "^"),
-    "RecurrentPPO, dense": Style(CLASS_COLOURS[3], "--", "^"),
-    "DQN, dense": Style("#999999", "--", "D"),
+_NEURONS = {"GNM": ("blue", "o"), "LIF": ("sky", "s"), "MST": ("green", "^")}
+_RULES = {"ALL": "-", "ET": ":", "ET modulated": "--"}
+_OTHERS = {
+    "network, BP": ("black", "-", "D"),
+    "PPO, cost": ("vermillion", "-", "o"),
+    "PPO, dense": ("vermillion", "--", "o"),
+    "PPO linear, cost": ("orange", "-", "s"),
+    "RecurrentPPO, cost": ("purple", "-", "^"),
+    "RecurrentPPO, dense": ("purple", "--", "^"),
+    "DQN, dense": ("grey", "--", "D"),
 }
+STYLES = {
+    f"{neuron}, {rule}": Style(OKABE_ITO[colour], dashes, mark)
+    for neuron, (colour, mark) in _NEURONS.items()
+    for rule, dashes in _RULES.items()
+} | {name: Style(OKABE_ITO[c], dashes, mark) for name, (c, dashes, mark) in _OTHERS.items()}
 """Learners with a learning curve; the others are rows of the table only."""
 
 

@@ -1,20 +1,8 @@
-"""Neurons, rules and agents by name, as experiments and command lines give them."""
+"""The agent that a neuron, or a network, and a learning rule make together."""
 
 from __future__ import annotations
 
 from typing import Any
-
-from agents import registry
-
-
-def neuron_class(spec: str) -> Any:
-    """The class of a neuron: a registered name, "module:Class" or "path/to/file.py:Class"."""
-    return registry.find_model(spec)
-
-
-def rule_class(spec: str) -> Any:
-    """The class of a learning rule, likewise."""
-    return registry.find_rule(spec)
 
 
 def default_rule(neuron: Any) -> str:
@@ -52,13 +40,3 @@ def new_agent(
     if neuron.graded:
         from agents.continuous import ContinuousAgent as agent_class
     return agent_class(neuron, rule, n_inputs, seed, initial_weight, **bounds)
-
-
-def neurons() -> dict[str, Any]:
-    """All neurons, by name."""
-    return registry.neurons() | registry.networks()
-
-
-def rules() -> dict[str, Any]:
-    """All learning rules, by name."""
-    return registry.rules()

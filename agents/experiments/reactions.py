@@ -27,7 +27,7 @@ from agents.experiments.training import (
     stream_seeds,
 )
 from agents.experiments.verdict import Claim, Finding, Results
-from agents.plotting import BLUE, CLASS_COLOURS, GREY, INK, NARROW, WIDE, panels, shade, styled
+from agents.plotting import BLUE, GREY, INK, NARROW, OKABE_ITO, WIDE, panels, shade, styled
 from gnm_env import Patterns, Task, Trial
 
 if TYPE_CHECKING:
@@ -182,9 +182,6 @@ CLAIMS = (
 
 # --- the figures ---------------------------------------------------------------------------------
 
-TRACE_COLOURS = (CLASS_COLOURS[5], *CLASS_COLOURS[1:5])
-"""Each trace has a panel of its own besides."""
-
 
 def _draw_volumes(results: Results) -> Figure:
     data, task, patterns = first_stored(results["F8"])
@@ -208,9 +205,10 @@ def _draw_mistakes(results: Results) -> Figure:
 
 def draw_volumes(trial: Trial, deterministic: Course, stochastic: Mapping[int, Course]) -> Figure:
     """Stochastic traces over the deterministic one (black), all with the same input."""
+    colours = ("sky", "vermillion", "green", "purple", "orange")
     rows = [("infinitely many molecules (black in every panel)", deterministic, INK)]
     rows += [
-        (f"{number:,} molecules per input spike", course, TRACE_COLOURS[k % len(TRACE_COLOURS)])
+        (f"{number:,} molecules per input spike", course, OKABE_ITO[colours[k % 5]])
         for k, (number, course) in enumerate(stochastic.items())
     ]
     top = 1.15 * max(deterministic.theta_r, *(float(course.V.max()) for _, course, _ in rows))

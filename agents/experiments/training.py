@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from agents import noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Coordinate, Experiment, Setting, Variable
-from agents.experiments.models import neuron_class, new_agent, rule_class
+from agents.experiments.models import new_agent
+from agents.registry import find_model, find_rule
 from gnm_env import Patterns, Task
 
 RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
@@ -86,7 +87,7 @@ def make_agent(setting: Setting, task: Task) -> Any:
     """The untrained agent that a setting describes."""
     neuron, rule = (
         kind(**{f.name: setting[f.name] for f in fields(kind) if f.name in setting})
-        for kind in (neuron_class(setting["neuron"]), rule_class(setting["rule"]))
+        for kind in (find_model(setting["neuron"]), find_rule(setting["rule"]))
     )
     initial_weight = setting.get("initial_weight")
     if setting.get("start") == "published":
@@ -172,7 +173,7 @@ def _last(default: str, given: Sequence[str | None]) -> str:
 
 
 def _refuse_unknown(names: set[str], neuron: str, rule: str) -> None:
-    kinds = neuron_class(neuron), rule_class(rule)
+    kinds = find_model(neuron), find_rule(rule)
     known = [{f.name for f in fields(kind)} for kind in kinds]
     unknown = sorted(names - _SHARED - _OWN - set().union(*known))
     if unknown:
@@ -226,8 +227,8 @@ def protocol(task: Task, sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Every default that the settings `sets` leave out, and how seeds become streams."""
     neurons = sorted({setting["neuron"] for setting in sets if "neuron" in setting})
     rules = sorted({setting["rule"] for setting in sets if "rule" in setting})
-    types = {kind: neuron_class(kind) for kind in neurons}
-    defaults = {**types, **{rule: rule_class(rule) for rule in rules}}
+    types: dict[str, Any] = {kind: find_model(kind) for kind in neurons}
+    defaults = {**types, **{rule: find_rule(rule) for rule in rules}}
     world = {k: v for k, v in asdict(task).items() if k not in ("n_classes", "targets")}
     usual = task.targets == tuple(range(1, task.n_classes + 1))
     return {

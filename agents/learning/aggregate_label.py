@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agents.learning.rule import Rule, RuleParameters, decay_option
 from agents.simd import any_lane, like, load, store, where
 from gnm_env.checks import real
-from gnm_env.compiled import compiled
+from gnm_env.compiled import compiled, inlined
 
 _INSERTED = 20
 """Up to this many of the largest eligibilities are found by insertion, more by cuts."""
@@ -20,13 +20,13 @@ _FEW, _CUTS = 16.0, 8
 """Cuts count all values until at most so many are left in each lane, or so often."""
 
 
-@compiled
+@inlined
 def teaching_signal(static: tuple[int, ...], V: Any, E: Any) -> Any:
     """ε_i = Σ_t x_i(t) V(t)."""
     return V
 
 
-@compiled
+@inlined
 def weight_change(
     p: RuleParameters,
     static: tuple[int, ...],
@@ -76,7 +76,7 @@ def nth_largest(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) ->
     return load(largest, n, lanes)
 
 
-@compiled
+@inlined
 def _between(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> Any:
     """`nth_largest` in O(N) whatever n, in all lanes at once: cuts between the lowest and highest.
 
@@ -123,7 +123,7 @@ def _between(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> An
     return high
 
 
-@compiled
+@inlined
 def _extremes(values: NDArray[np.float64], lanes: Any) -> tuple[Any, Any]:
     """The lowest and the highest of the values, in each lane."""
     low, high = like(np.inf, lanes), like(-np.inf, lanes)
@@ -150,7 +150,7 @@ def _count_above(values: NDArray[np.float64], cut: Any) -> Any:
     return count
 
 
-@compiled
+@inlined
 def _next_cut(low: Any, high: Any, above_low: Any, above_high: Any, n: int, cuts: int) -> Any:
     """Where n values would lie above if they lay evenly; every other time the middle."""
     share = like(0.5, low) if cuts % 2 == 0 else (n + 0.5 - above_high) / (above_low - above_high)

@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.learning.rule import Rule, decay_option
 from agents.simd import load
-from gnm_env.compiled import compiled, inlined
+from gnm_env.compiled import inlined
 
 
 @inlined
@@ -24,7 +24,7 @@ def error_at(target: Any, counts: Any, above: Any, segment: int, t: int, zero: A
     return zero - load(above, t, zero)
 
 
-@compiled
+@inlined
 def teaching_signal(static: tuple[int, ...], V: Any, E: Any) -> Any:
     """ε_i = Σ_t x_i(t) E(t); modulated, E(t) V(t) takes the place of E(t)."""
     return E * V if static[0] == 1 else E

@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 
 from agents.learning.rule import RuleParameters
 from agents.simd import load, store, where
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 
 
-@compiled
+@inlined
 def clipped(p: RuleParameters, weight: Any) -> Any:
     """The weight, or the bound that it has passed."""
     weight = where(weight > p.lowest, weight, p.lowest)
     return where(weight < p.highest, weight, p.highest)
 
 
-@compiled
+@inlined
 def apply_change(
     p: RuleParameters,
     learns: Any,

@@ -82,8 +82,8 @@ def step_template(
 
 
 def _bound(recovery: str) -> Any:
-    hill = specialise(hill_template, recovery, RECOVERY=recovery)
-    return specialise(step_template, recovery, RECOVERY=recovery, hill=hill)
+    hill = specialise(hill_template, recovery, inline=True, RECOVERY=recovery)
+    return specialise(step_template, recovery, inline=True, RECOVERY=recovery, hill=hill)
 
 
 STEPS = {recovery: _bound(recovery) for recovery in (NONE, WHOLE, INFINITE, REAL)}
@@ -136,6 +136,15 @@ class GNM(Neuron):
     @property
     def threshold(self) -> float:
         return self.theta_r
+
+    @property
+    def reads_V(self) -> bool:
+        return self.readout == "V"
+
+    @property
+    def readout_lag(self) -> int:
+        """1 for D, which is made of the potential of the bin before."""
+        return int(self.readout == "D")
 
     def parameters(self) -> tuple[float, ...]:
         return (

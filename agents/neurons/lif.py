@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
 from gnm_env.checks import MAX_BINS, real, whole
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 
 
 class Parameters(NamedTuple):
@@ -23,7 +23,7 @@ class State(NamedTuple):
     """Bins left whose input is ignored."""
 
 
-@compiled
+@inlined
 def step(
     p: Parameters, static: tuple[int, ...], state: State, current: Any
 ) -> tuple[State, Response]:
@@ -66,6 +66,10 @@ class LIF(Neuron):
     @property
     def threshold(self) -> float:
         return self.theta
+
+    @property
+    def reads_V(self) -> bool:
+        return True
 
     def parameters(self) -> tuple[float, ...]:
         return (self.alpha, self.theta, float(self.refractory))

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
 from gnm_env.checks import real
-from gnm_env.compiled import compiled
+from gnm_env.compiled import inlined
 from gnm_env.rules import compiled_rising as rising
 
 
@@ -33,7 +33,7 @@ class State(NamedTuple):
     V: Any
 
 
-@compiled
+@inlined
 def step(
     p: Parameters, static: tuple[int, ...], state: State, current: Any
 ) -> tuple[State, Response]:
@@ -92,6 +92,10 @@ class MST(Neuron):
     @property
     def threshold(self) -> float:
         return self.theta
+
+    @property
+    def reads_V(self) -> bool:
+        return True
 
     @property
     def v_norm(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import fields, replace
@@ -80,10 +81,13 @@ class Agent:
         if initial_weight is None:
             initial_weight = model.default_initial_weight
         scale = real("initial_weight", initial_weight, low=-1e100, high=1e100)
-        rng = np.random.default_rng((whole("seed", seed, low=0, high=2**128 - 1), 2))
+        seed = whole("seed", seed, low=0, high=2**128 - 1)
+        rng = np.random.default_rng((seed, 2))
         drawn = model.initial_weights(rng, self._n_inputs, scale)
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
+        self._rule_memory = np.zeros(len(rule.memory_type._fields))
+        self.rng = np.random.default_rng((seed, 3)) if rule.explore else None
         self._trials = 0
         self.overflowed = False
         self._prepare()
@@ -103,6 +107,7 @@ class Agent:
             np.array(self.rule_parameters(), np.float64)[:, None],
             self._velocity[:, None],
             rule.static(self._n_inputs),
+            self._rule_memory[:, None],
         )
         self._heard: Heard | None = None
         self._make_room(256, 4 * self._n_inputs + 256)
@@ -124,7 +129,7 @@ class Agent:
         """The present trial: bins heard, state, memory, and the used part of each buffer."""
         assert self._heard is not None
         bins, events = self._bin, self._heard.offsets[self._bin]
-        used = (events, bins + 1, bins, bins, bins, bins * self._model.n_notes)
+        used = (events, bins + 1, bins, bins, bins, bins, bins * self._model.n_notes)
         pairs: Any = zip(self._heard, used, strict=True)
         parts = [buffer[:n].copy() for buffer, n in pairs]
         return bins, self._state.copy(), self._block.arrays.memory.copy(), parts
@@ -196,6 +201,24 @@ class Agent:
         self.velocity = values
 
     @property
+    def rule_memory(self) -> NDArray[np.float64]:
+        """float64, what the rule remembers from trial to trial; assigning copies, checked."""
+        return self._rule_memory
+
+    @rule_memory.setter
+    def rule_memory(self, values: ArrayLike) -> None:
+        put("rule_memory", values, self._rule_memory)
+
+    @property
+    def potential(self) -> float:
+        """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
+
+        Divided by `model.threshold` it is what an environment's `potential` takes for its pictures.
+        """
+        assert self._heard is not None
+        return float(self._heard.V[self._bin - 1, 0]) if self._bin else 0.0
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest weight; infinite where there is no bound."""
         return self._weight_bounds or (-np.inf, np.inf)
@@ -248,6 +271,10 @@ class Agent:
         if out < 0.0:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
             out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        if self.rng is not None:
+            V = self._heard.V[self._bin, 0]
+            out = self._loops.explore_bin(self._rule_block, self._block, V, self.rng.random())
+            self._heard.output[self._bin] = out
         self._bin += 1
         return out
 
@@ -296,17 +323,19 @@ class Agent:
             self._require_agreement(info)
         elif feedback == "sign":
             return whole_trial(self._bin, told=float(np.sign(reward)))
-        if feedback == "reward":
-            return whole_trial(self._bin, told=reward - 1.0)
         if feedback == "none":
             return whole_trial(self._bin, told=1.0)
+        if feedback == "reward" and not sign_only:
+            return whole_trial(self._bin, told=float(reward) - 1.0)
         if sign_only:
             raise ValueError(
                 f"{type(self._rule).__name__} needs to know {FEEDBACK[feedback]}, and this "
                 'environment tells the sign of the error only: use feedback="cost", or a rule '
                 "such as AggregateLabel or CriticalThreshold"
             )
-        return segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        told = segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        self._rule.check_label(told.label)
+        return told
 
     def _require_agreement(self, info: Any) -> None:
         """ValueError if the terminal `info` contradicts what was heard and answered."""
@@ -330,6 +359,7 @@ class Agent:
         long = Heard(
             np.empty(events, np.int32),
             np.zeros(bins + 1, np.int64),
+            np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
@@ -411,7 +441,7 @@ class Agent:
         _, advance = model.advance()
         biexponential = rule.kernel(model).biexponential
         return (
-            type(self), advance, model.static(self._n_inputs), type(rule),
+            type(self), advance, model.static(self._n_inputs), type(rule), rule.variant,
             rule.static(self._n_inputs), biexponential, self._n_inputs,
         )  # fmt: skip
 
@@ -421,11 +451,17 @@ class Agent:
         return AgentBatch(agents, source)
 
     def _take(
-        self, weights: NDArray[np.float64], velocity: NDArray[np.float64], trials: int, over: bool
+        self,
+        weights: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        rule_memory: NDArray[np.float64],
+        trials: int,
+        over: bool,
     ) -> None:
         """What training side by side has made of it."""
         self._weights[:] = weights
         self._velocity[:] = velocity
+        self._rule_memory[:] = rule_memory
         self._trials, self.overflowed = trials, over
 
     # --- checkpoints -----------------------------------------------------------------------------
@@ -469,6 +505,8 @@ class Agent:
         model = replace(self._model, **changes)  # type: ignore[type-var]
         agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
         agent.weights, agent.velocity = self._weights, self._velocity
+        agent.rule_memory = self._rule_memory
+        agent.rng = copy.deepcopy(self.rng)
         agent._trials = self._trials
         return agent
 

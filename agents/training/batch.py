@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from agents.training.binding import loops
 from agents.training.compile_errors import explained
+from agents.training.exploration import put_state, state_of
 from agents.training.source import Source
-from agents.training.streams import Learning, Models
+from agents.training.streams import MOST_SPIKES, Learning, Models, Tally
 
 if TYPE_CHECKING:
     from agents.training.agent import Agent
@@ -91,13 +92,15 @@ class AgentBatch:
             self._blocks([agent.velocity for agent in self._agents]),
             overflow,
             self._blocks([[float(agent.trials)] for agent in self._agents]),
+            self._blocks([agent.rule_memory for agent in self._agents]),
+            self._blocks([state_of(agent.rng) for agent in self._agents], np.uint64),
             first.rule.static(first.n_inputs),
         )
         self._trials = 0
 
-    def _blocks(self, rows: Rows) -> NDArray[np.float64]:
+    def _blocks(self, rows: Rows, dtype: type = np.float64) -> NDArray[Any]:
         """One row per agent -> (blocks, columns, width), the last agent repeated to fill up."""
-        table = np.array(rows, np.float64)
+        table: NDArray[Any] = np.array(rows, dtype)
         padding = -len(table) % self._width
         table = np.concatenate([table, np.repeat(table[-1:], padding, axis=0)])
         blocks = table.reshape(-1, self._width, table.shape[1])
@@ -114,13 +117,21 @@ class AgentBatch:
 
         Returns, per agent, the number of trials answered wrongly and Σ |label − emitted|.
         """
-        run = getattr(self._loops, f"train_{self._source.kind}")
-        try:
-            wrong, absolute = run(rng, ahead, trials, self._models, self._learning, self._trials)
-        except NumbaError as error:
-            raise explained(error, self._agents[0].model, self._agents[0].rule) from None
+        wrong, absolute = self._zeros(), self._zeros()
+        for done, batch, drawn, longest in self._source.batches(rng, ahead, trials):
+            try:
+                self._loops.train(
+                    batch, drawn, longest, self._models, self._learning, self._trials + done,
+                    wrong, absolute,
+                )  # fmt: skip
+            except NumbaError as error:
+                raise explained(error, self._agents[0].model, self._agents[0].rule) from None
         self._trials += trials
         return self._per_agent(wrong).astype(np.int64), self._per_agent(absolute)
+
+    def _zeros(self) -> NDArray[np.float64]:
+        """A number for each lane, (blocks, 1, width)."""
+        return np.zeros((len(self._models.weights), 1, self._width))
 
     def survive(self, rng: Generator, cap: int) -> NDArray[np.int64]:
         """Bins that each agent survives on the endless stream of `rng`, at most `cap`."""
@@ -132,18 +143,19 @@ class AgentBatch:
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         """Responses to `trials` trials of the source, learning off."""
+        n_blocks, n_classes = len(self._models.weights), self._source.n_classes
+        table = np.zeros((n_blocks, self._width, n_classes, MOST_SPIKES + 1), np.int64)
+        tally = Tally(table, self._zeros(), self._zeros(), self._zeros())
+        noise_bins = 0
         ahead = self._source.ahead(rng, trials)
-        run = getattr(self._loops, f"answer_{self._source.kind}")
-        table, false_positives, wrong, absolute, noise_bins = run(
-            rng, ahead, trials, self._source.n_classes, self._models
-        )
-        blocks, width, *rest = table.shape  # named, since without classes it is empty
+        for _, batch, drawn, longest in self._source.batches(rng, ahead, trials):
+            noise_bins += self._loops.answer(batch, drawn, longest, self._models, tally)
         return Answers(
-            table.reshape(blocks * width, *rest)[: len(self._agents)],
-            self._per_agent(false_positives).astype(np.int64),
+            table.reshape(-1, *table.shape[2:])[: len(self._agents)],
+            self._per_agent(tally.false_positives).astype(np.int64),
             noise_bins,
-            self._per_agent(wrong).astype(np.int64),
-            self._per_agent(absolute),
+            self._per_agent(tally.wrong).astype(np.int64),
+            self._per_agent(tally.absolute),
             trials,
         )
 
@@ -151,12 +163,16 @@ class AgentBatch:
         """Put what was learned into the agents."""
         weights = self._rows(self._models.weights)
         velocity = self._rows(self._learning.velocity)
+        memory = self._rows(self._learning.memory)
+        generators = self._rows(self._learning.generators)
         overflowed = self.overflowed()
         for k, agent in enumerate(self._agents):
             heard = int(self._per_agent(self._learning.heard)[k]) + self._trials
-            agent._take(weights[k], velocity[k], heard, bool(overflowed[k] >= 0))
+            if agent.rng is not None:
+                put_state(agent.rng, generators[k])
+            agent._take(weights[k], velocity[k], memory[k], heard, bool(overflowed[k] >= 0))
 
-    def _rows(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _rows(self, blocks: NDArray[Any]) -> NDArray[Any]:
         """(blocks, rows, width) -> one row per agent."""
         return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: len(self._agents)]
 

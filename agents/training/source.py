@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from agents.training.batches import DataAhead
+from gnm_env.batches import Batch, DataAhead, draw_batch, new_batch, take_batch
 from gnm_env.task import Patterns, Task, task_arrays
 from gnm_env.trial import Trial, draw_trial
 from gnm_env.trials import Trials
@@ -17,8 +18,8 @@ from gnm_env.trials import Trials
 class Source:
     """Base of what agents hear."""
 
-    kind: ClassVar[str]
-    """Names the compiled loops: a key of `agents.training.binding.SOURCES`."""
+    fill: ClassVar[Any]
+    """Compiled: fill a batch with trials; see `gnm_env.batches.draw_batch`."""
     n_inputs: int
     n_classes: int
     mean_bins: float
@@ -35,6 +36,21 @@ class Source:
         """What compiled code takes the next `trials` trials from."""
         raise NotImplementedError
 
+    def batches(
+        self, rng: Generator, ahead: Any, trials: int
+    ) -> Iterator[tuple[int, Batch, int, int]]:
+        """The next `trials` trials, `ahead` being `self.ahead(…)` for them, in batches.
+
+        Gives the number of trials that came before, the batch, the number of trials in it and the
+        bins of the longest.
+        """
+        batch, done = new_batch(), 0
+        while done < trials:
+            batch, drawn, longest = type(self).fill(rng, ahead, done, trials - done, batch)
+            batch = Batch(*batch)
+            yield done, batch, drawn, longest
+            done += drawn
+
     def trials(self, rng: Generator, n: int) -> list[Trial]:
         """The next `n` trials."""
         raise NotImplementedError
@@ -50,7 +66,7 @@ class Source:
 class TaskSource(Source):
     """Trials of a task with its patterns, drawn from the caller's generator."""
 
-    kind = "task"
+    fill = draw_batch
 
     def __init__(self, task: Task, patterns: Patterns) -> None:
         self.arrays = task_arrays(task, patterns)
@@ -75,7 +91,7 @@ class DataSource(Source):
     A new epoch begins with the source, and when all trials have been heard.
     """
 
-    kind = "data"
+    fill = take_batch
 
     def __init__(self, data: Trials) -> None:
         if len(data) == 0:

@@ -11,21 +11,26 @@ from numpy.typing import NDArray
 from agents.learning.rule import RuleParameters
 from agents.model import Arrays, Block
 from agents.simd import any_lane, full, load, pack, store, unpack, where
-from agents.training.batches import new_batch, trial_of
 from agents.training.slots import (
+    EXPLORES,
+    TOLD_REWARD,
     USES_ERROR,
     USES_OUTPUT,
+    USES_READOUT,
+    WEIGHS,
     WIDTH,
     Parameters,
     State,
     advance,
     correction,
-    fill_batch,
+    explore_trial,
     learn_trial,
     output,
     run_trial,
+    weighed,
 )
 from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
+from gnm_env.batches import Batch, trial_of
 from gnm_env.compiled import inlined
 from gnm_env.rules import compiled_too_few as too_few
 from gnm_env.rules import compiled_too_many as too_many
@@ -63,6 +68,10 @@ class Learning(NamedTuple):
     """(blocks, 1, WIDTH); the trial in which a weight would have overflowed, or −1."""
     heard: Block
     """(blocks, 1, WIDTH); trials that each model had heard before."""
+    memory: Block
+    """(blocks, numbers, WIDTH); what the rule remembers from trial to trial."""
+    generators: NDArray[np.uint64]
+    """(blocks, 4, WIDTH); see `agents.training.exploration`."""
     static: tuple[int, ...]
 
 
@@ -73,73 +82,81 @@ def block_of(models: Models, block: int, memory: Block, notes: Block) -> ModelBl
     return ModelBlock(models.parameters[block], arrays, models.static, models.n_notes)
 
 
-def train_template(
-    rng: Generator, source: Any, trials: int, models: Models, learning: Learning, first_trial: int
-) -> tuple[Block, Block]:
-    """Every model of every block hears and learns `trials` trials of `source`.
+def new_log_template(bins: int, segments: int) -> TrialLog:
+    """Room for what trials of so many bins and segments leave for learning."""
+    return TrialLog(
+        np.empty((bins, WIDTH)),
+        np.empty((bins if USES_ERROR else 0, WIDTH)),
+        np.empty((bins if USES_OUTPUT else 0, WIDTH)),
+        np.empty((bins if USES_READOUT else 0, WIDTH)),
+        np.empty((segments, WIDTH)),
+    )
 
-    `first_trial` numbers the first of them. Returns the number of trials answered wrongly and
-    Σ |label − emitted|, (blocks, 1, WIDTH) each.
+
+new_log: Any = None  # bound to the template above
+
+
+def train_template(
+    batch: Batch,
+    drawn: int,
+    longest: int,
+    models: Models,
+    learning: Learning,
+    first_trial: int,
+    wrong: Block,
+    absolute: Block,
+) -> None:
+    """Every model of every block hears and learns the `drawn` trials of `batch`, one by one.
+
+    `longest` is the length of the longest in bins, `first_trial` the number of the first. Adds the
+    number of trials answered wrongly and Σ |label − emitted|, (blocks, 1, WIDTH) each.
     """
     zero = full(0.0, WIDTH)
-    n_blocks = len(models.weights)
-    wrong = np.zeros((n_blocks, 1, WIDTH))
-    absolute = np.zeros((n_blocks, 1, WIDTH))
     memory = np.zeros((models.n_memory, WIDTH))
     scratch = new_scratch(models.weights.shape[1], WIDTH)
-    notes = np.empty((0, WIDTH))
-    log = TrialLog(
-        np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH)), np.empty((0, WIDTH))
-    )
-    batch = new_batch()
-    done = 0
-    while done < trials:
-        batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
-        if longest > len(log.V) or batch.edges.size > len(log.counts):
-            bins = max(2 * longest, len(log.V))
-            log = TrialLog(
-                np.empty((bins, WIDTH)),
-                np.empty((bins if USES_ERROR else 0, WIDTH)),
-                np.empty((bins if USES_OUTPUT else 0, WIDTH)),
-                np.empty((batch.edges.size, WIDTH)),
-            )
-            notes = np.empty((bins * models.n_notes, WIDTH))
-        for block in range(n_blocks):
-            p = unpack(Parameters, models.parameters[block], zero)
-            # Out of the inner loop, where a view of an array costs as much as some bins.
-            model = block_of(models, block, memory, notes)
-            rule = RuleBlock(learning.parameters[block], learning.velocity[block], learning.static)
-            decay = unpack(RuleParameters, learning.parameters[block], zero).decay
-            rate = unpack(RuleParameters, learning.parameters[block], zero).learning_rate
-            heard = load(learning.heard[block], 0, zero) + float(first_trial + done)
-            overflowed_in = load(learning.overflow[block], 0, zero)
-            n_wrong = load(wrong[block], 0, zero)
-            total_error = load(absolute[block], 0, zero)
-            for k in range(drawn):
-                trial = trial_of(batch, k)
-                outcome, _ = run_trial(p, model, trial, log)
-                error = outcome.label - outcome.emitted
-                error = where(error < 0.0, zero - error, error)
-                n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
-                total_error = total_error + error
-                # What is not finite stays so: the last bin tells for all.
-                V = load(log.V, trial.edges[len(trial.edges) - 1] - 1, zero)
-                diverged = (overflowed_in < 0.0) & (V * 0.0 != 0.0)
-                overflowed_in = where(diverged, float(first_trial + done + k), overflowed_in)
-                c = where(overflowed_in < 0.0, correction(outcome), zero)
-                if any_lane(c != 0.0):
-                    store(scratch.corrections, 0, c)
-                    left = 1.0 - (heard + float(k)) * decay
-                    store(scratch.rates, 0, rate * where(left > 0.0, left, zero))
-                    learn_trial(rule, model, trial, log, scratch)
-                    taught = load(scratch.corrections, 0, zero) != 0.0
-                    failed = taught & (load(scratch.finite, 0, zero) == 0.0)
-                    overflowed_in = where(failed, float(first_trial + done + k), overflowed_in)
-            store(learning.overflow[block], 0, overflowed_in)
-            store(wrong[block], 0, n_wrong)
-            store(absolute[block], 0, total_error)
-        done += drawn
-    return wrong, absolute
+    notes = np.empty((longest * models.n_notes, WIDTH))
+    log = new_log(longest, batch.edges.size)
+    for block in range(len(models.weights)):
+        p = unpack(Parameters, models.parameters[block], zero)
+        # Out of the inner loop, where a view of an array costs as much as some bins.
+        model = block_of(models, block, memory, notes)
+        rule = RuleBlock(
+            learning.parameters[block], learning.velocity[block], learning.static,
+            learning.memory[block],
+        )  # fmt: skip
+        decay = unpack(RuleParameters, learning.parameters[block], zero).decay
+        rate = unpack(RuleParameters, learning.parameters[block], zero).learning_rate
+        heard = load(learning.heard[block], 0, zero) + float(first_trial)
+        overflowed_in = load(learning.overflow[block], 0, zero)
+        n_wrong = load(wrong[block], 0, zero)
+        total_error = load(absolute[block], 0, zero)
+        for k in range(drawn):
+            trial = trial_of(batch, k)
+            outcome, _ = run_trial(p, model, trial, log)
+            if EXPLORES:
+                outcome = explore_trial(rule, model, trial, log, learning.generators[block])
+            error = outcome.label - outcome.emitted
+            error = where(error < 0.0, zero - error, error)
+            n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
+            total_error = total_error + error
+            # What is not finite stays so: the last bin tells for all.
+            V = load(log.V, trial.edges[len(trial.edges) - 1] - 1, zero)
+            diverged = (overflowed_in < 0.0) & (V * 0.0 != 0.0)
+            overflowed_in = where(diverged, float(first_trial + k), overflowed_in)
+            c = where(overflowed_in < 0.0, correction(outcome), zero)
+            if WEIGHS and any_lane(c != 0.0):
+                c = weighed(rule, c + 1.0 if TOLD_REWARD else c, c != 0.0)
+            if any_lane(c != 0.0):
+                store(scratch.corrections, 0, c)
+                left = 1.0 - (heard + float(k)) * decay
+                store(scratch.rates, 0, rate * where(left > 0.0, left, zero))
+                learn_trial(rule, model, trial, log, scratch)
+                taught = load(scratch.corrections, 0, zero) != 0.0
+                failed = taught & (load(scratch.finite, 0, zero) == 0.0)
+                overflowed_in = where(failed, float(first_trial + k), overflowed_in)
+        store(learning.overflow[block], 0, overflowed_in)
+        store(wrong[block], 0, n_wrong)
+        store(absolute[block], 0, total_error)
 
 
 def survive_template(rng: Generator, task: TaskArrays, cap: int, models: Models) -> Block:
@@ -194,51 +211,45 @@ def survive_template(rng: Generator, task: TaskArrays, cap: int, models: Models)
     return bins
 
 
-def answer_template(
-    rng: Generator, source: Any, trials: int, n_classes: int, models: Models
-) -> tuple[NDArray[np.int64], Block, Block, Block, int]:
-    """Responses of each model to `trials` trials of `source`, without learning.
+class Tally(NamedTuple):
+    """What `answer` adds up."""
 
-    Returns how often each number of spikes was given to each class, (blocks, WIDTH, C,
-    MOST_SPIKES + 1); output spikes in noise, trials answered wrongly and Σ |label − emitted|,
-    (blocks, 1, WIDTH); and the number of noise bins. Amounts are rounded, in each segment.
+    table: NDArray[np.int64]
+    """How often each number of spikes was given to each class: (blocks, WIDTH, C, most + 1)."""
+    false_positives: Block
+    """Output in noise, rounded in each segment; this and what follows: (blocks, 1, WIDTH)."""
+    wrong: Block
+    absolute: Block
+
+
+def answer_template(batch: Batch, drawn: int, longest: int, models: Models, tally: Tally) -> int:
+    """Add the responses of each model to the `drawn` trials of `batch`, without learning.
+
+    Returns the number of noise bins.
     """
     zero = full(0.0, WIDTH)
-    n_blocks = len(models.weights)
-    table = np.zeros((n_blocks, WIDTH, n_classes, MOST_SPIKES + 1), np.int64)
-    false_positives = np.zeros((n_blocks, 1, WIDTH))
-    wrong = np.zeros((n_blocks, 1, WIDTH))
-    absolute = np.zeros((n_blocks, 1, WIDTH))
     memory = np.zeros((models.n_memory, WIDTH))
-    batch = new_batch()
-    noise_bins = done = 0
-    while done < trials:
-        batch, drawn, longest = fill_batch(rng, source, done, trials - done, batch)
-        log = TrialLog(
-            np.empty((longest, WIDTH)),
-            np.empty((longest, WIDTH)),
-            np.empty((longest, WIDTH)),
-            np.empty((batch.edges.size, WIDTH)),
-        )
-        notes = np.empty((longest * models.n_notes, WIDTH))
-        for k in range(drawn):
-            trial = trial_of(batch, k)
-            for segment in range(0, len(trial.target), 2):
-                noise_bins += trial.edges[segment + 1] - trial.edges[segment]
-            for block in range(n_blocks):
-                p = unpack(Parameters, models.parameters[block], zero)
-                outcome, _ = run_trial(p, block_of(models, block, memory, notes), trial, log)
-                error = outcome.label - outcome.emitted
-                error = where(error < 0.0, zero - error, error)
-                store(wrong[block], 0, load(wrong[block], 0, zero) + where(error > 0.5, 1.0, zero))
-                store(absolute[block], 0, load(absolute[block], 0, zero) + error)
-                for segment in range(len(trial.target)):
-                    class_ = batch.classes[batch.edge_of[k] + segment]
-                    for lane in range(WIDTH):
-                        given = int(np.floor(log.counts[segment, lane] + 0.5))
-                        if segment % 2 == 0:
-                            false_positives[block, 0, lane] += given
-                        elif class_ >= 0:
-                            table[block, lane, class_, min(given, MOST_SPIKES)] += 1
-        done += drawn
-    return table, false_positives, wrong, absolute, noise_bins
+    log = new_log(longest, batch.edges.size)
+    notes = np.empty((longest * models.n_notes, WIDTH))
+    noise_bins = 0
+    for k in range(drawn):
+        trial = trial_of(batch, k)
+        for segment in range(0, len(trial.target), 2):
+            noise_bins += trial.edges[segment + 1] - trial.edges[segment]
+        for block in range(len(models.weights)):
+            p = unpack(Parameters, models.parameters[block], zero)
+            outcome, _ = run_trial(p, block_of(models, block, memory, notes), trial, log)
+            error = outcome.label - outcome.emitted
+            error = where(error < 0.0, zero - error, error)
+            wrong, absolute = tally.wrong[block], tally.absolute[block]
+            store(wrong, 0, load(wrong, 0, zero) + where(error > WRONG_BEYOND, 1.0, zero))
+            store(absolute, 0, load(absolute, 0, zero) + error)
+            for segment in range(len(trial.target)):
+                class_ = batch.classes[batch.edge_of[k] + segment]
+                for lane in range(WIDTH):
+                    given = int(np.floor(log.counts[segment, lane] + 0.5))
+                    if segment % 2 == 0:
+                        tally.false_positives[block, 0, lane] += given
+                    elif class_ >= 0:
+                        tally.table[block, lane, class_, min(given, MOST_SPIKES)] += 1
+    return noise_bins

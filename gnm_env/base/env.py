@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Mapping
 from typing import Any
@@ -10,30 +11,58 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.base.params import EnvParams
-from gnm_env.checks import whole
+from gnm_env.base.params import EnvParams, HasParams
+from gnm_env.checks import generator, shown, whole
 from gnm_env.generators import Generators
 
 
-class PatternEnv(gym.Env[NDArray[np.int8], Any]):
+class PatternEnv(HasParams, gym.Env[NDArray[np.int8], Any]):
     """Base of the environments. Subclasses say what `reset` and `step` do."""
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(self, params: EnvParams, action_space: spaces.Space[Any]) -> None:
-        self.task, self.patterns = params.task, params.patterns
+        self._params = params
         self.render_mode = params.render_mode
         self.observation_space = spaces.Box(0, 1, (params.n_inputs,), np.int8)
         self.action_space = action_space
-        self.potential = float("nan")
-        """The agent's membrane potential in units of its threshold, for pictures only: an agent may
-        set it before `step`."""
+        self._potential = math.nan
         self._held: Generators | None = None
         self._scroll: Any = None
         self._window: Any = None
         self._draw_pictures(params)
+
+    @property
+    def np_random(self) -> Generator:
+        """The generator that everything is drawn from."""
+        return super().np_random
+
+    @np_random.setter
+    def np_random(self, value: Generator | None) -> None:
+        self._np_random = None if value is None else generator("np_random", value)
+        self._np_random_seed = -1
+        self._generator_changed()
+
+    def _generator_changed(self) -> None:
+        """There is another generator, or the same one was given once more."""
+
+    @property
+    def potential(self) -> float:
+        """The agent's membrane potential in units of its threshold, NaN where it is not known.
+
+        For pictures only: an agent may set it before `step`, and the picture shows its course.
+        """
+        return self._potential
+
+    @potential.setter
+    def potential(self, value: Any) -> None:
+        given = np.asarray(value)
+        if given.size != 1 or given.dtype.kind not in "fiu":
+            raise ValueError(f"potential must be one number, got {shown(value)}")
+        self._potential = float(given.item())
 
     def _draw_pictures(self, params: EnvParams) -> None:
         """Prepare what `render_mode` asks for; offer only what this installation can show."""
@@ -85,7 +114,9 @@ class PatternEnv(gym.Env[NDArray[np.int8], Any]):
 
     def _seed(self, seed: int | None) -> None:
         """Begin with a generator of that seed; None: the present one goes on."""
-        super().reset(seed=None if seed is None else whole("seed", seed, low=0))
+        if seed is not None:
+            super().reset(seed=whole("seed", seed, low=0))
+            self._generator_changed()
 
     @staticmethod
     def _require_reset() -> None:
@@ -98,10 +129,10 @@ def checked_options(options: Any, known: tuple[str, ...]) -> Mapping[str, Any]:
         return {}
     allowed = ", ".join(map(repr, known)) or "none"
     if not isinstance(options, Mapping):
-        raise ValueError(f"options must be a dict with keys among {allowed}, got {options!r}")
+        raise ValueError(f"options must be a dict with keys among {allowed}, got {shown(options)}")
     for name in options:
         if name not in known:
-            raise ValueError(f"unknown reset option {name!r}; known options: {allowed}")
+            raise ValueError(f"unknown reset option {shown(name)}; known options: {allowed}")
     return options
 
 
@@ -112,5 +143,13 @@ def spike_from(action: Any) -> int:
     except TypeError:
         spike = -1
     if spike != 0 and spike != 1:
-        raise ValueError(f"action must be 0 (silent) or 1 (spike), got {action!r}")
+        raise ValueError(f"action must be 0 (silent) or 1 (spike), got {shown(action)}")
     return spike
+
+
+def array_of(actions: Any) -> NDArray[Any]:
+    """`actions` as an array; an empty one where they are none."""
+    try:
+        return np.asarray(actions)
+    except (TypeError, ValueError):  # ragged lists
+        return np.empty(0, object)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from gnm_env.checks import whole
+from gnm_env.checks import shown, whole
 from gnm_env.task import Patterns, Task, TaskArrays, task_arrays
 
 RENDER_MODES = ("human", "rgb_array")
@@ -53,7 +53,7 @@ class EnvParams:
         self._put("pattern_seed", whole("pattern_seed", self.pattern_seed, low=0))
         mode = self.render_mode
         if mode is not None and not (isinstance(mode, str) and mode in RENDER_MODES):
-            raise ValueError(f"render_mode must be None, 'human' or 'rgb_array', got {mode!r}")
+            raise ValueError(f"render_mode must be None, 'human' or 'rgb_array', got {shown(mode)}")
         self._resolve()
 
     def _resolve(self) -> None:
@@ -78,6 +78,22 @@ class EnvParams:
         """Task and patterns for compiled code."""
         assert self.task is not None and self.patterns is not None
         return task_arrays(self.task, self.patterns)
+
+
+class HasParams:
+    """What an environment tells of its arguments; none of it can be changed afterwards."""
+
+    _params: EnvParams
+
+    @property
+    def task(self) -> Task | None:
+        """The task; None where trials come from a data set."""
+        return self._params.task
+
+    @property
+    def patterns(self) -> Patterns | None:
+        """The task's patterns; None where trials come from a data set."""
+        return self._params.patterns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +122,7 @@ class VectorParams:
             put("max_episode_steps", steps)
         put("autoreset_mode", self._checked_mode())
         if not isinstance(self.copy, (bool, np.bool_)):
-            raise ValueError(f"copy must be True or False, got {self.copy!r}")
+            raise ValueError(f"copy must be True or False, got {shown(self.copy)}")
         put("copy", bool(self.copy))
 
     def _checked_mode(self) -> AutoresetMode:
@@ -118,7 +134,7 @@ class VectorParams:
         options = ", ".join(repr(mode.value) for mode in AutoresetMode)
         raise ValueError(
             f"autoreset_mode must be one of {options} or a gymnasium.vector.AutoresetMode, "
-            f"got {self.autoreset_mode!r}"
+            f"got {shown(self.autoreset_mode)}"
         )
 
 
@@ -152,8 +168,8 @@ def _unknown(name: str, known: list[str], task_names: list[str]) -> str:
     near = difflib.get_close_matches(str(name), known + task_names, n=1)
     hint = f", did you mean {near[0]!r}?" if near else "."
     return (
-        f"unknown keyword {name!r}{hint} The environment takes {', '.join(known)}, and the fields "
-        f"of a Task: {', '.join(task_names)}"
+        f"unknown keyword {shown(name)}{hint} The environment takes {', '.join(known)}, and the "
+        f"fields of a Task: {', '.join(task_names)}"
     )
 
 

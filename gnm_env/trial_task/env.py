@@ -6,20 +6,20 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from gnm_env.base.env import PatternEnv, checked_options, spike_from
 from gnm_env.base.params import from_keywords, signature
+from gnm_env.checks import shown
 from gnm_env.rules import dense_reward, reward_for
 from gnm_env.segments import segment_at
 from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_next
 from gnm_env.trial_task.info import info_of
-from gnm_env.trial_task.params import TrialEnvParams, require_presentations
+from gnm_env.trial_task.params import HasTrialParams, TrialEnvParams, require_presentations
 
 
-class PatternTrialEnv(PatternEnv):
+class PatternTrialEnv(HasTrialParams, PatternEnv):
     """A trial of noise in which fixed spatio-temporal patterns hide.
 
     ## Description
@@ -99,9 +99,6 @@ class PatternTrialEnv(PatternEnv):
         given = {"task": task, "patterns": patterns, "feedback": feedback, **arguments}
         (params,) = from_keywords((TrialEnvParams,), given)
         super().__init__(params, params.action_space)
-        self.trials = params.trials
-        self.feedback, self.output = params.feedback, params.output
-        self.max_output, self.tolerance = params.max_output, params.tolerance
         self._graded = params.graded
         self._n_inputs = params.n_inputs
         if self.trials is None:
@@ -112,15 +109,7 @@ class PatternTrialEnv(PatternEnv):
         self._ahead: list[NDArray[np.int8]] = []
         """The bins not yet shown, the next one last; empty while no trial is under way."""
 
-    @property
-    def np_random(self) -> Generator:
-        """The generator that trials are drawn from."""
-        return super().np_random
-
-    @np_random.setter
-    def np_random(self, value: Generator) -> None:
-        self._np_random = value
-        self._np_random_seed = -1
+    def _generator_changed(self) -> None:
         self._order = None
 
     def reset(
@@ -130,8 +119,6 @@ class PatternTrialEnv(PatternEnv):
         if "trial" in given:
             self._check(given["trial"])
         self._seed(seed)
-        if seed is not None:
-            self._order = None
         self._begin(given["trial"] if "trial" in given else self._next_trial())
         return self._ahead.pop(), {}
 
@@ -212,7 +199,8 @@ class PatternTrialEnv(PatternEnv):
         amount = float(given.item()) if is_number else math.nan
         if not 0.0 <= amount <= self.max_output:
             raise ValueError(
-                f"action must be one amount in 0 … {self.max_output:g} (max_output), got {action!r}"
+                f"action must be one amount in 0 … {self.max_output:g} (max_output), "
+                f"got {shown(action)}"
             )
         return amount
 

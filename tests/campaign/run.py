@@ -26,7 +26,7 @@ PARTS = ("inputs", "configurations", "kills", "flips")
 OUTCOMES = ("refused", "fine", "nonsense", "foreign", "crash", "hang")
 EVERY = {"small": 25, "full": 1}
 """Every how many-th bad input is tried."""
-CONFIGURATIONS = {"small": 12, "full": 500}
+CONFIGURATIONS = {"small": 3, "full": 500}
 KILLS = {"small": 6, "full": 100}
 FLIPS = {"small": (30, 20), "full": (300, 200)}
 

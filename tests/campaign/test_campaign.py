@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from tests.campaign import configurations, flips, kills, run
+from tests.campaign import configurations, flips, kills, run, stores
 
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -32,4 +32,10 @@ def test_a_kill_while_saving_loses_nothing_and_leaves_nothing() -> None:
 def test_a_changed_byte_is_refused_or_without_effect() -> None:
     counts = flips.campaign(*run.FLIPS["small"], seed=0)
     assert counts["tried"] == sum(run.FLIPS["small"])
+    assert counts["wrong"] == 0
+
+
+def test_a_store_survives_killed_sweeps_and_a_changed_byte() -> None:
+    counts = stores.campaign(kills=2, flips=8, seed=0)
+    assert counts["tried"] == 10
     assert counts["wrong"] == 0

@@ -195,6 +195,20 @@ class TestEnvironments:
             frames.append(env.render())
         assert not np.array_equal(frames[0], frames[1])  # type: ignore[arg-type]
 
+    @pytest.mark.parametrize("value", ["x", None, [1, 2], True, {}], ids=repr)
+    def test_a_potential_is_one_number(self, id: str, value: Any) -> None:
+        env: Any = gym.make(id).unwrapped
+        with pytest.raises(ValueError, match="potential must be one number"):
+            env.potential = value
+
+    def test_any_potential_can_be_drawn(self, id: str) -> None:
+        env: Any = gym.make(id, render_mode="rgb_array").unwrapped
+        env.reset(seed=0)
+        for value in (1e308, -1e308, np.inf, np.float32(0.5), np.array(0.7)):
+            env.potential = value
+            env.step(0)
+            env.render()
+
     def test_without_a_render_mode_there_is_no_picture(self, id: str) -> None:
         env = gym.make(id).unwrapped
         env.reset(seed=0)

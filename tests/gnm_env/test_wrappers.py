@@ -212,7 +212,15 @@ def test_the_kth_reset_is_seeded_with_seed_plus_k():
         ({"decays": (0.3, 0.0)}, "decays must be > 0"),
         ({"decays": (1.5,)}, "decays must be in 0 … 1"),
         ({"decays": ()}, "at least one decay, must be in 1 … 1000, got 0"),
+        ({"decays": "0.3"}, "decays must be a number or a row of numbers, got '0.3'"),
+        ({"decays": True}, "decays must be a number"),
+        ({"decays": (0.3, True)}, "decays must be a number"),
+        ({"decays": {0.3: 1}}, "decays must be a number or a row of numbers"),
+        ({"decays": (0.3,) * 1001}, "must be in 1 … 1000, got 1001"),
         ({"scale": 0.0}, "scale must be > 0"),
+        ({"scale": 1e300}, "traces must fit into float32.*choose a scale nearer to 1"),
+        ({"scale": 5e-324}, "traces must fit into float32"),
+        ({"previous_action": "no"}, "previous_action must be True or False"),
         ({"own_decay": 2.0}, "own_decay must be in 0 … 1"),
         ({"rate": -0.1}, "rate must be in 0 … 1"),
     ],
@@ -231,10 +239,21 @@ def test_environments_that_cannot_be_wrapped_are_refused_with_a_reason():
         RisingEdge(gym.make(TRIAL, output="graded"))
     with pytest.raises(ValueError, match="seed must be a whole number"):
         SeededEpisodes(gym.make(STREAM), seed=0.5)
+    with pytest.raises(ValueError, match="env must be a gymnasium VectorEnv"):
+        VectorSynapticTrace(gym.make(STREAM))
+
+
+@pytest.mark.parametrize("action", [2, 0.5, "1", None, float("nan"), np.array([0, 1])], ids=repr)
+def test_a_level_is_0_or_1_and_nothing_that_becomes_it(action):
+    env = RisingEdge(gym.make(STREAM))
+    env.reset()
     with pytest.raises(ValueError, match=r"action must be 0 .silent. or 1"):
-        env = RisingEdge(gym.make(STREAM))
-        env.reset()
-        env.step(2)
+        env.step(action)
+    many = VectorRisingEdge(gym.make_vec(STREAM, 2))
+    many.reset()
+    for actions in ([0, action], [[0], [1]], "01"):
+        with pytest.raises(ValueError, match="actions must be 2 levels of 0 or 1"):
+            many.step(actions)
 
 
 @pytest.mark.parametrize("extra", [{"previous_action": True}, {"own_decay": 0.1}], ids=str)

@@ -1,4 +1,4 @@
-"""Trials for compiled training, several at a time: drawn, or taken from a data set."""
+"""Trials for compiled code, several at a time: drawn from a stream, or taken from a data set."""
 
 from __future__ import annotations
 
@@ -34,20 +34,13 @@ class Batch(NamedTuple):
     """Room for drawing."""
 
 
-@compiled
-def new_batch() -> Batch:
-    """Buffers that a batch of the default task fits into."""
-    return Batch(
-        np.empty(BATCH_BINS, np.int32),
-        np.zeros(2 * BATCH_BINS, np.int64),
-        np.zeros(1_024, np.int64),
-        np.zeros(1_024, np.int64),
-        np.zeros(1_024, np.int64),
-        np.zeros(BATCH_BINS + 1, np.int64),
-        np.zeros(BATCH_BINS + 1, np.int64),
-        np.empty(256, np.int64),
-        np.empty(256, np.int64),
-    )
+def new_batch(bins: int = 2 * BATCH_BINS) -> Batch:
+    """Buffers for about so many bins; they grow where they are too short."""
+    channels, offsets = np.empty(bins, np.int32), np.zeros(bins + 1, np.int64)
+    edges, target, classes = (np.zeros(bins // 4 + 4, np.int64) for _ in range(3))
+    bin_of, edge_of = (np.zeros(min(bins, BATCH_BINS) + 1, np.int64) for _ in range(2))
+    onsets, which = (np.empty(64, np.int64) for _ in range(2))
+    return Batch(channels, offsets, edges, target, classes, bin_of, edge_of, onsets, which)
 
 
 @compiled
