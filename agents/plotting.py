@@ -14,7 +14,8 @@ import numpy as np
 
 from agents.history import History
 from agents.recording import record
-from gnm_env import Patterns, Task, Trial, colours, draw_trial
+from agents.training.source import source_of
+from gnm_env import Patterns, Task, Trial, Trials, colours
 from gnm_env.colours import MISTAKE, as_hex
 
 if TYPE_CHECKING:
@@ -108,10 +109,8 @@ def class_colour(class_: int) -> str:
 
 def shade(axes: Axes, trial: Trial) -> None:
     """Colour the bins of each presentation by its class."""
-    for onset, class_ in zip(trial.onsets, trial.classes, strict=True):
-        axes.axvspan(
-            onset, onset + trial.pattern_bins, color=class_colour(class_), alpha=0.15, lw=0
-        )
+    for onset, end, class_ in zip(trial.onsets, trial.ends, trial.classes, strict=True):
+        axes.axvspan(onset, end, color=class_colour(class_), alpha=0.15, lw=0)
 
 
 def save(figure: Figure, folder: Path, name: str, kinds: tuple[str, ...]) -> dict[str, Path]:
@@ -137,12 +136,18 @@ def save(figure: Figure, folder: Path, name: str, kinds: tuple[str, ...]) -> dic
 # --- pictures of one agent -----------------------------------------------------------------------
 
 
-def plot(agent: Any, task: Task, patterns: Patterns, history: History | None = None) -> Figure:
+def plot(
+    agent: Any,
+    task: Task | Trials,
+    patterns: Patterns | None = None,
+    history: History | None = None,
+) -> Figure:
     """What an agent hears and answers in one trial, and how it learned.
 
     Args:
         agent: a neuron or a network, in bins or in continuous time.
-        task, patterns: what it hears.
+        task, patterns: what it hears; or a data set of trials in place of both, of which the first
+            with as large a label as half of them have is drawn.
         history: its learning curve, from `train` or, for one agent, `History.of`.
 
     Returns:
@@ -192,6 +197,8 @@ def draw_raster(axes: Axes, trial: Trial) -> None:
     bins, channels = np.nonzero(trial.dense())
     axes.plot(bins + 0.5, channels, "|", color="0.15", markersize=3, markeredgewidth=0.8)
     axes.set(xlim=(0, trial.n_bins), ylim=(-1, trial.n_inputs), ylabel="input channel")
+    if trial.label_only:
+        axes.set_title(f"label {trial.label}", loc="right")
     middles = (trial.onsets + trial.ends) / 2
     for middle, class_, owed in zip(middles, trial.classes, trial.targets, strict=True):
         axes.annotate(
@@ -244,15 +251,18 @@ def _model(agent: Any) -> Any:
     return agent.neuron if hasattr(agent, "neuron") else agent.network
 
 
-def shown_trial(task: Task, patterns: Patterns, seed: int = 7) -> Trial:
+def shown_trial(task: Task | Trials, patterns: Patterns | None, seed: int = 7) -> Trial:
     """A trial with every class in it, of ordinary length, for a picture; `seed` chooses it."""
+    source = source_of(task, patterns)
+    if isinstance(task, Trials):
+        return task[int(np.argmax(task.labels >= np.median(task.labels)))]
     rng = np.random.default_rng(seed)
-    trial = draw_trial(task, patterns, rng)
-    wanted = min(task.n_classes, 4)
+    (trial,) = source.trials(rng, 1)
+    wanted = min(source.n_classes, 4)
     for _ in range(200):
         if wanted <= len(trial.onsets) <= wanted + 2 and len(set(trial.classes)) >= wanted:
             break
-        trial = draw_trial(task, patterns, rng)
+        (trial,) = source.trials(rng, 1)
     return trial
 
 

@@ -25,7 +25,8 @@ class Batch(NamedTuple):
     target: NDArray[np.int64]
     """Of each trial, from edge_of[k] on: one number less than it has edges."""
     classes: NDArray[np.int64]
-    """Class of each presentation, at the place of its segment in `target`; −1 elsewhere."""
+    """Class of each presentation, at the place of its segment in `target`; −1 in noise, and −2
+    where only the label is known."""
     bin_of: NDArray[np.int64]
     edge_of: NDArray[np.int64]
     onsets: NDArray[np.int64]
@@ -129,7 +130,7 @@ def take_batch(
         first, n_segments = edge_of[k], edge_of[k + 1] - edge_of[k] - 1
         presentation = data.first_edge[i] // 2 - i
         for segment in range(n_segments):
-            classes[first + segment] = -1
+            classes[first + segment] = -2 if data.label_only[i] else -1
             if segment % 2 == 1:
                 classes[first + segment] = data.classes[presentation]
                 presentation += 1

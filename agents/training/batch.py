@@ -29,10 +29,10 @@ class Answers:
 
     Attributes:
         table: int64 (agents, classes, most + 1); how often each number of output spikes was given
-            to each class. The last column means "that many or more". Trials of which only the label
-            is known do not count here.
+            to each class. The last column means "that many or more".
         false_positives: int64 (agents,), output spikes in noise.
-        noise_bins: number of noise bins heard.
+        noise_bins: number of noise bins heard. Trials of which only the label is known count
+            neither here nor in what stands above.
         wrong: int64 (agents,), trials whose sum of output spikes was not the aggregate label.
         absolute: float64 (agents,), Σ |label − emitted|.
         trials: number of trials heard.
@@ -151,7 +151,7 @@ class AgentBatch:
         for _, batch, drawn, longest in self._source.batches(rng, ahead, trials):
             noise_bins += self._loops.answer(batch, drawn, longest, self._models, tally)
         return Answers(
-            table.reshape(-1, *table.shape[2:])[: len(self._agents)],
+            table.reshape(n_blocks * self._width, n_classes, MOST_SPIKES + 1)[: len(self._agents)],
             self._per_agent(tally.false_positives).astype(np.int64),
             noise_bins,
             self._per_agent(tally.wrong).astype(np.int64),

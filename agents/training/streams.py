@@ -234,8 +234,10 @@ def answer_template(batch: Batch, drawn: int, longest: int, models: Models, tall
     noise_bins = 0
     for k in range(drawn):
         trial = trial_of(batch, k)
-        for segment in range(0, len(trial.target), 2):
-            noise_bins += trial.edges[segment + 1] - trial.edges[segment]
+        classes = batch.classes[batch.edge_of[k] : batch.edge_of[k + 1] - 1]
+        for segment in range(len(trial.target)):
+            if classes[segment] == -1:
+                noise_bins += trial.edges[segment + 1] - trial.edges[segment]
         for block in range(len(models.weights)):
             p = unpack(Parameters, models.parameters[block], zero)
             outcome, _ = run_trial(p, block_of(models, block, memory, notes), trial, log)
@@ -245,10 +247,10 @@ def answer_template(batch: Batch, drawn: int, longest: int, models: Models, tall
             store(wrong, 0, load(wrong, 0, zero) + where(error > WRONG_BEYOND, 1.0, zero))
             store(absolute, 0, load(absolute, 0, zero) + error)
             for segment in range(len(trial.target)):
-                class_ = batch.classes[batch.edge_of[k] + segment]
+                class_ = classes[segment]
                 for lane in range(WIDTH):
                     given = int(np.floor(log.counts[segment, lane] + 0.5))
-                    if segment % 2 == 0:
+                    if class_ == -1:
                         tally.false_positives[block, 0, lane] += given
                     elif class_ >= 0:
                         tally.table[block, lane, class_, min(given, MOST_SPIKES)] += 1

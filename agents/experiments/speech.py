@@ -1,0 +1,332 @@
+"""A word in speech: neurons that are told how often a word was said, and nothing more.
+
+The phrases come from `gnm_env.speech`. Here are the learners, what they are compared with, how they
+are scored on voices that they have never heard, and when they spike: before, after or at the word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents import registry
+from agents.evaluation import answers
+from agents.neuron_agent import NeuronAgent
+from agents.neurons.gnm import GNM
+from agents.neurons.mst import MST
+from agents.recording import record
+from agents.training.many import train_many
+from gnm_env import Trials
+from gnm_env.speech.phrases import BIN, DIGITS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DELAYS = range(0, 81, 10)
+"""Bins by which the copies of each channel come later: 0, 50 … 400 ms."""
+LATE = 40
+"""A spike belongs to a word from its first bin until so many bins after its last: 200 ms."""
+RESTARTS = 5
+"""Trainings of which the one with the most phrases counted exactly in training is kept."""
+EPOCHS = 16
+PENALTIES = (1.0, 10.0, 100.0, 1_000.0, 10_000.0)
+"""What ridge regression tries."""
+
+
+class Score(NamedTuple):
+    """How well phrases were counted."""
+
+    exact: float
+    """Share of the phrases whose count was exactly right."""
+    mean_error: float
+    """Mean |label − count|."""
+
+
+def score(counts: NDArray[np.int64], labels: NDArray[np.int64]) -> Score:
+    """The score of counts (n,) against labels (n,)."""
+    error = np.abs(counts - labels)
+    return Score(float(np.mean(error == 0)), float(np.mean(error)))
+
+
+# --- controls ------------------------------------------------------------------------------------
+
+
+def silent(train: Trials, test: Trials) -> NDArray[np.int64]:
+    """No spike in any phrase."""
+    return np.zeros(len(test), np.int64)
+
+
+def constant(train: Trials, test: Trials) -> NDArray[np.int64]:
+    """The commonest label of training for every phrase."""
+    return np.full(len(test), np.bincount(train.labels).argmax())
+
+
+def channel_counts(phrases: Trials) -> NDArray[np.float64]:
+    """How often each channel spikes in each phrase, and its duration in bins, (n, N + 1)."""
+    a, n = phrases.arrays, len(phrases)
+    trial = np.repeat(np.arange(n), phrases.n_spikes)
+    counts = np.bincount(trial * a.n_inputs + a.channels, minlength=n * a.n_inputs)
+    return np.column_stack([counts.reshape(n, -1), phrases.n_bins]).astype(np.float64)
+
+
+def ridge(train: Trials, test: Trials) -> NDArray[np.int64]:
+    """Ridge regression on channel counts and duration, rounded to whole numbers from 0 on.
+
+    A fifth of the training voices chooses the penalty.
+    """
+    own, held_out = train.split(0.8, seed=0, by="voice")
+    rights = [score(_ridge(own, held_out, penalty), held_out.labels).exact for penalty in PENALTIES]
+    return _ridge(train, test, PENALTIES[int(np.argmax(rights))])
+
+
+def _ridge(train: Trials, test: Trials, penalty: float) -> NDArray[np.int64]:
+    x, y = channel_counts(train), train.labels.astype(np.float64)
+    mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-9)
+    z = (x - mean) / scale
+    weights = np.linalg.solve(z.T @ z + penalty * np.eye(z.shape[1]), z.T @ (y - y.mean()))
+    guess = (channel_counts(test) - mean) / scale @ weights + y.mean()
+    return np.maximum(np.round(guess), 0.0).astype(np.int64)
+
+
+CONTROLS = {"silent": silent, "constant": constant, "ridge": ridge}
+
+
+# --- learners ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Learner:
+    """A neuron, its rule, and how it begins.
+
+    Attributes:
+        neuron: MST(…) or another.
+        rule: name of the rule, as the registry knows it.
+        settings: of the rule, but for `decay_trials`, which falls with the length of the training.
+        bounds: weight bounds; None: free and signed.
+        initial_weight: largest initial weight.
+    """
+
+    neuron: Any
+    rule: str
+    settings: Mapping[str, Any]
+    bounds: tuple[float, float] | None = None
+    initial_weight: float = 1e-3
+
+    def agent(self, n_inputs: int, seed: int, trials: int) -> NeuronAgent:
+        """A new agent, to be trained on so many trials."""
+        rule = registry.rules()[self.rule](**self.settings, decay_trials=trials)  # type: ignore[call-arg]
+        return NeuronAgent(self.neuron, rule, n_inputs, seed, self.initial_weight, self.bounds)
+
+
+SLOW_MST = MST(tau_m=10.0, tau_s=2.5)
+"""τ_m 50 ms, τ_s 12.5 ms."""
+LEARNERS: dict[str, Learner] = {
+    "MST, CriticalThreshold": Learner(
+        SLOW_MST, "critical", {"learning_rate": 3e-4, "momentum": 0.9}
+    ),
+    "GNM, CriticalThreshold": Learner(
+        GNM(alpha=0.1), "critical", {"learning_rate": 3e-4, "momentum": 0.9}
+    ),
+    "MST, ALL": Learner(SLOW_MST, "all", {"learning_rate": 1e-5, "momentum": 0.9}),
+    "GNM, ALL": Learner(GNM(alpha=0.1), "all", {"learning_rate": 1e-5, "momentum": 0.9}),
+}
+"""By the name in the table; those whose rule this package does not have are left out of it."""
+
+
+def learners() -> dict[str, Learner]:
+    """The learners whose rule is there."""
+    return {name: one for name, one in LEARNERS.items() if one.rule in registry.rules()}
+
+
+def train(
+    learner: Learner, phrases: Trials, *, restarts: int, epochs: int, seed: int = 0
+) -> list[NeuronAgent]:
+    """`restarts` agents trained side by side, the best in training first.
+
+    All hear the same phrases in the same order; `seed` is of that order, and the initial weights
+    are those of seed, seed + 1, …
+    """
+    trials = epochs * len(phrases)
+    agents = [learner.agent(phrases.n_inputs, seed + k, trials) for k in range(restarts)]
+    train_many(agents, phrases, trials=trials, seed=seed)
+    order = np.argsort(answers(agents, phrases).wrong, kind="stable")
+    return [agents[k] for k in order]
+
+
+def exact(agent: NeuronAgent, phrases: Trials) -> Score:
+    """The score of an agent."""
+    result = answers(agent, phrases)
+    return Score(
+        1.0 - float(result.wrong[0]) / result.trials, float(result.absolute[0]) / result.trials
+    )
+
+
+# --- when it spikes ------------------------------------------------------------------------------
+
+
+class Timing(NamedTuple):
+    """Where the spikes are, against where the word is."""
+
+    recall: float
+    """Share of the words of that kind that got a spike of their own."""
+    precision: float
+    """Share of the spikes that a word of that kind got."""
+
+
+def timing(
+    spikes: Sequence[NDArray[np.int64]], phrases: Trials, *, mirrored: bool = False
+) -> Timing:
+    """Match spikes with words, each at most once.
+
+    A word takes the first free spike from its first bin until LATE bins after its last.
+
+    Args:
+        spikes: the bins of the output spikes of each phrase.
+        phrases: with the columns `words`, `onsets` and `ends`.
+        mirrored: count the bins of the spikes from the end of what was said, as a control: what the
+            same number of spikes at unrelated times gets.
+    """
+    word = DIGITS.index(phrases.metadata["word"])
+    columns = (phrases.columns[name] for name in ("words", "onsets", "ends"))
+    hits = n_words = 0
+    for bins, words, onsets, ends in zip(spikes, *columns, strict=True):
+        free = sorted((ends[-1] + LATE - bins) if mirrored else bins)
+        for said, onset, end in zip(words, onsets, ends, strict=True):
+            if said != word:
+                continue
+            n_words += 1
+            mine = next((t for t in free if onset <= t < end + LATE), None)
+            if mine is not None:
+                hits += 1
+                free.remove(mine)
+    n_spikes = sum(map(len, spikes))
+    return Timing(hits / max(n_words, 1), hits / max(n_spikes, 1))
+
+
+def spike_bins(agent: NeuronAgent, phrases: Trials) -> list[NDArray[np.int64]]:
+    """The bins of the output spikes of each phrase."""
+    return [np.flatnonzero(record(agent, trial).spikes) for trial in phrases]
+
+
+# --- all of it -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: scores by split, and for a neuron when it spikes on test voices."""
+
+    name: str
+    train: float
+    """Share of the training phrases counted exactly."""
+    scores: Mapping[str, Score]
+    timing: Timing | None = None
+    mirrored: Timing | None = None
+    restarts: Sequence[float] = ()
+    """Share counted exactly on test voices by each training, the kept one first."""
+
+
+def control_rows(splits: Mapping[str, Trials]) -> list[Row]:
+    """Silence, the commonest label, and ridge regression."""
+    return [
+        Row(
+            name,
+            score(guess(splits["train"], splits["train"]), splits["train"].labels).exact,
+            {
+                split: score(guess(splits["train"], phrases), phrases.labels)
+                for split, phrases in splits.items()
+                if split != "train"
+            },
+        )
+        for name, guess in CONTROLS.items()
+    ]
+
+
+def neuron_row(name: str, agents: Sequence[NeuronAgent], splits: Mapping[str, Trials]) -> Row:
+    """The line of a learner, from its trained agents, the best in training first.
+
+    `splits` are delayed as the agents want them.
+    """
+    best, test = agents[0], splits["test"]
+    spikes = spike_bins(best, test)
+    return Row(
+        name,
+        exact(best, splits["train"]).exact,
+        {split: exact(best, part) for split, part in splits.items() if split != "train"},
+        timing(spikes, test),
+        timing(spikes, test, mirrored=True),
+        [exact(agent, test).exact for agent in agents],
+    )
+
+
+def text_table(rows: Sequence[Row]) -> str:
+    """The table to print: exact share in training; exact share and mean |error| by split."""
+    splits = list(rows[0].scores)
+    head = f"{'':26}{'training':>9}" + "".join(f"{split:>16}" for split in splits)
+    lines = [head + "   recall precision (mirrored)"]
+    for row in rows:
+        line = f"{row.name:26}{row.train:9.1%}"
+        line += "".join(f"{s.exact:9.1%} {s.mean_error:6.2f}" for s in row.scores.values())
+        if row.timing is not None and row.mirrored is not None:
+            line += f"   {row.timing.recall:6.1%} {row.timing.precision:9.1%}"
+            line += f" ({row.mirrored.recall:.1%}, {row.mirrored.precision:.1%})"
+        lines.append(line)
+    return "\n".join(lines)
+
+
+# --- pictures ------------------------------------------------------------------------------------
+
+
+def shown_phrase(phrases: Trials) -> int:
+    """Number of a phrase for a picture: the first with two of the word, not side by side."""
+    word = DIGITS.index(phrases.metadata["word"])
+    for k, words in enumerate(phrases.columns["words"]):
+        if words.count(word) == 2 and len(words) >= 5 and words[-1] != word:
+            return k
+    return int(np.argmax(phrases.labels))
+
+
+def draw(agent: NeuronAgent, phrases: Trials, number: int) -> Figure:
+    """One phrase: what is heard, the potential and the spikes, and where the words are.
+
+    Args:
+        agent: a trained neuron.
+        phrases: as they were made, without delays.
+        number: of the phrase.
+    """
+    from agents.plotting import GREY, OUTPUT, RED, panels, styled
+
+    one = phrases[[number]]
+    trial, course = one[0], record(agent, one.delayed(DELAYS)[0])
+    word = DIGITS.index(phrases.metadata["word"])
+    columns = [phrases.columns[name][number] for name in ("words", "onsets", "ends")]
+    t = (np.arange(trial.n_bins) + 0.5) * BIN
+    with styled():
+        figure, grid = panels(2, 1, width=7.1, height=4.2, sharex=True, height_ratios=(1.4, 1))
+        raster, potential = grid[:, 0]
+        bins = np.repeat(np.arange(trial.n_bins), np.diff(trial.offsets))
+        raster.plot(t[bins], trial.channels / 4, "|", color="0.2", ms=3, mew=0.7)
+        raster.set(ylabel="band (4 channels each)", ylim=(-0.5, trial.n_inputs / 4))
+        potential.plot(t, course.V, color="black", lw=0.9)
+        threshold = agent.neuron.threshold
+        potential.axhline(threshold, color=GREY, lw=0.8, ls="--")
+        top = 1.15 * max(float(course.V.max()), threshold)
+        spikes = t[course.spikes]
+        potential.plot(spikes, np.full(len(spikes), top), "v", color=OUTPUT, ms=6)
+        potential.set(ylabel="potential, spikes (▾)", xlabel="time (s)", xlim=(0, t[-1]))
+        for said, onset, end in zip(*columns, strict=True):
+            is_word = said == word
+            for axes in (raster, potential):
+                axes.axvspan(
+                    onset * BIN, end * BIN, color=RED if is_word else GREY,
+                    alpha=0.18 if is_word else 0.07, lw=0,
+                )  # fmt: skip
+            raster.annotate(
+                DIGITS[said], ((onset + end) / 2 * BIN, 1.02), xycoords=("data", "axes fraction"),
+                ha="center", color=RED if is_word else "0.3",
+                fontweight="bold" if is_word else "normal",
+            )  # fmt: skip
+    return figure
