@@ -58,7 +58,13 @@ def train(
     callback = checked_callback(callback)
     _require_learner(agent)
     _require_env(env, agent)
-    sign_only = getattr(env.unwrapped, "feedback", None) == "sign"
+    feedback = getattr(env.unwrapped, "feedback", None)
+    sign_only = feedback == "sign"
+    if feedback == "dense" and getattr(getattr(agent, "rule", None), "feedback", None) == "reward":
+        raise ValueError(
+            f"{type(agent.rule).__name__} learns from the reward of the whole trial, and this "
+            'environment rewards on the way: use feedback="cost"'
+        )
     if isinstance(seed, Generator):
         env.unwrapped.np_random = seed
         seed = None

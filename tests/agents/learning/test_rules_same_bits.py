@@ -245,6 +245,12 @@ def test_a_rule_that_needs_more_than_the_sign_says_so(rule: str) -> None:
         train(agent, env_of(rule, feedback="sign"), 3, seed=0)
 
 
+@pytest.mark.parametrize("rule", ["mstdpet", "policy-gradient"])
+def test_a_reward_that_comes_on_the_way_is_refused(rule: str) -> None:
+    with pytest.raises(ValueError, match=r'rewards on the way: use feedback="cost"'):
+        train(agent_of(rule, "gnm"), env_of(rule, feedback="dense"), 3, seed=0)
+
+
 def test_labels_without_places_are_refused_by_rules_that_need_places() -> None:
     trial = gnm_env.Trial.from_times([np.array([0.001])] * 12, n_bins=30, bin_width=0.001, label=1)
     for rule in ("peak-error", "resume", "surrogate"):
