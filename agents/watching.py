@@ -86,7 +86,7 @@ def play(
 def _frames(
     agent: Any, env: gym.Env[Any, Any], bins: int, seed: int, every: int, told: dict[str, Any]
 ) -> Iterator[Any]:
-    """Answer `bins` bins; after every so many, what `render` gives. Mistakes are noted in `told`."""
+    """Answer `bins` bins; after every so many, what `render` gives. `told` counts mistakes."""
     answer = _answering(agent, env.unwrapped)
     obs, _ = env.reset(seed=seed)
     begins = True

@@ -57,8 +57,8 @@ def _model(cls: Any, rules: dict[str, Any]) -> dict[str, Any]:
 
 
 def _described(cls: Any) -> dict[str, Any]:
-    first, *_ = (cls.__doc__ or "").strip().splitlines() or [cls.__name__]
-    return {"name": cls.name, "title": cls.__name__, "about": first}
+    about = " ".join((cls.__doc__ or cls.__name__).split()).partition(". ")[0].rstrip(".")
+    return {"name": cls.name, "title": cls.__name__, "about": about}
 
 
 def _first(cls: Any, count: int) -> tuple[str, ...]:

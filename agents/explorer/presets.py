@@ -36,8 +36,8 @@ PRESETS = (
     ),
     Preset(
         "Silent for ever",
-        "All weights start at 0, so V stays 0; the modulated error trace multiplies the error by V, "
-        "and an error times nothing teaches nothing. The score is that of silence.",
+        "All weights start at 0, so V stays 0; modulated, the rule multiplies the error by V, "
+        "and an error times nothing teaches nothing. Plain error trace (dashed) comes back to life.",
         "rule=et&r.modulate=1&initial_weight=0",
         "rule=et&initial_weight=0",
     ),

@@ -26,7 +26,7 @@ from gnm_env.checks import whole
 
 PAGE = Path(__file__).parent / "page"
 HOSTS = ("127.0.0.1", "localhost")
-"""Names by which a browser may call the page: whoever reaches it by another is not on this machine."""
+"""Names by which a browser may call the page: only this machine itself has these."""
 POLICY = "default-src 'self'; img-src 'self' data: blob:; frame-ancestors 'none'"
 """The page loads nothing from anywhere else."""
 CLOSED = 499

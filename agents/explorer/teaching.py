@@ -21,7 +21,6 @@ from gnm_env import Trial
 from gnm_env.compiled import compiled
 from gnm_env.trial_task.info import info_of
 
-
 MOST_BINS = 4_000
 """Longest trial that this serves: the twin's input has T · T bits."""
 
