@@ -70,7 +70,8 @@ def play(
         _IDS[hears], task=task, patterns=patterns, disable_env_checker=True,
         render_mode="human" if write is None else "rgb_array", **how,
     )  # fmt: skip
-    told = {"bins": bins, "mistakes": 0, "path": None if path is None else os.fspath(path)}
+    shown = None if path is None else os.fspath(path)
+    told: dict[str, Any] = {"bins": bins, "mistakes": 0, "path": shown}
     frames = _frames(agent, env, bins, seed, every, told)
     try:
         if write is None:

@@ -37,7 +37,7 @@ PRESETS = (
     Preset(
         "Silent for ever",
         "All weights start at 0, so V stays 0; modulated, the rule multiplies the error by V, "
-        "and an error times nothing teaches nothing. Plain error trace (dashed) comes back to life.",
+        "and an error times nothing teaches nothing. Unmodulated (dashed) it comes to life.",
         "rule=et&r.modulate=1&initial_weight=0",
         "rule=et&initial_weight=0",
     ),

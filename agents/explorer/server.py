@@ -152,7 +152,7 @@ class _Play(WebSocketHandler):
     def prepare(self) -> None:
         require_own_machine(self.request.host)
 
-    async def on_message(self, message: str | bytes) -> None:  # type: ignore[override]
+    async def on_message(self, message: str | bytes) -> None:
         said = json.loads(message)
         if "begin" in said:
             self.on_close()

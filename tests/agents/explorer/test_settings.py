@@ -84,11 +84,11 @@ def test_a_class_of_ones_own_has_its_sliders() -> None:
         Attributes:
             alpha: α, decay.
             pause: bins of a pause.
-            kind: "soft" or "hard".
+            reset: "soft" or "hard".
         """
 
         pause: int = 0
-        kind: str = "soft"
+        reset: str = "soft"
         name: ClassVar[str] = "slower-for-explorer"
 
     try:
@@ -98,7 +98,7 @@ def test_a_class_of_ones_own_has_its_sliders() -> None:
         by_key: dict[str, Any] = {one["key"]: one for one in found["controls"]}
         assert (by_key["n.alpha"]["symbol"], by_key["n.alpha"]["high"]) == ("α", 1.0)
         assert (by_key["n.pause"]["low"], by_key["n.pause"]["high"]) == (0, 25)
-        assert by_key["n.kind"]["options"] == ["soft", "hard"]
+        assert by_key["n.reset"]["options"] == ["soft", "hard"]
     finally:
         del registry._REGISTERED["neuron"]["slower-for-explorer"]
 
