@@ -120,7 +120,7 @@ def _answering(agent: Any, env: Any) -> Callable[[NDArray[np.int8], bool], Any]:
     def predict(obs: NDArray[np.int8], begins: bool) -> Any:
         nonlocal state
         action, state = agent.predict(
-            obs, None if begins else state, np.array([begins]), deterministic=True
+            obs, state=state, episode_start=np.array([begins]), deterministic=True
         )
         return action if np.size(action) > 1 else np.asarray(action).reshape(-1)[0]
 

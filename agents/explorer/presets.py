@@ -43,7 +43,7 @@ PRESETS = (
     ),
     Preset(
         "Above threshold for ever",
-        "V starts above the threshold and decays too slowly to come back. Without an upward "
+        "V rises above the threshold at once and decays too slowly to come back. Without an upward "
         "crossing there is no spike; too few, says the label, and the weights go further up.",
         "n.alpha=0.02&initial_weight=1",
     ),

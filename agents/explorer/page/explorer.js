@@ -284,7 +284,7 @@ async function compute(query, signal) {
 const STATES = {
   alive: "",
   silent: " It never spikes: V stays below the threshold.",
-  above: " It never spikes: V stays above the threshold, and only an upward crossing is a spike.",
+  above: " V stays above the threshold, and only an upward crossing is a spike.",
 };
 
 function say(message, wrong = false) {
