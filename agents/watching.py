@@ -70,7 +70,8 @@ def play(
         _IDS[hears], task=task, patterns=patterns, disable_env_checker=True,
         render_mode="human" if write is None else "rgb_array", **how,
     )  # fmt: skip
-    told = {"bins": bins, "mistakes": 0, "path": None if path is None else os.fspath(path)}
+    shown = None if path is None else os.fspath(path)
+    told: dict[str, Any] = {"bins": bins, "mistakes": 0, "path": shown}
     frames = _frames(agent, env, bins, seed, every, told)
     try:
         if write is None:
@@ -86,7 +87,7 @@ def play(
 def _frames(
     agent: Any, env: gym.Env[Any, Any], bins: int, seed: int, every: int, told: dict[str, Any]
 ) -> Iterator[Any]:
-    """Answer `bins` bins; after every so many, what `render` gives. Mistakes are noted in `told`."""
+    """Answer `bins` bins; after every so many, what `render` gives. `told` counts mistakes."""
     answer = _answering(agent, env.unwrapped)
     obs, _ = env.reset(seed=seed)
     begins = True
@@ -119,7 +120,7 @@ def _answering(agent: Any, env: Any) -> Callable[[NDArray[np.int8], bool], Any]:
     def predict(obs: NDArray[np.int8], begins: bool) -> Any:
         nonlocal state
         action, state = agent.predict(
-            obs, None if begins else state, np.array([begins]), deterministic=True
+            obs, state=state, episode_start=np.array([begins]), deterministic=True
         )
         return action if np.size(action) > 1 else np.asarray(action).reshape(-1)[0]
 

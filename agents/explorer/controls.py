@@ -7,6 +7,7 @@ found by trial: each class says by ValueError what it does not take.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 import types
 import typing
@@ -57,8 +58,8 @@ def _model(cls: Any, rules: dict[str, Any]) -> dict[str, Any]:
 
 
 def _described(cls: Any) -> dict[str, Any]:
-    first, *_ = (cls.__doc__ or "").strip().splitlines() or [cls.__name__]
-    return {"name": cls.name, "title": cls.__name__, "about": first}
+    about = " ".join((cls.__doc__ or cls.__name__).split()).partition(". ")[0].rstrip(".")
+    return {"name": cls.name, "title": cls.__name__, "about": about}
 
 
 def _first(cls: Any, count: int) -> tuple[str, ...]:
@@ -97,9 +98,8 @@ def controls(cls: Any, prefix: str, first: tuple[str, ...]) -> list[Control]:
             **kind,
         }
         if kind["kind"] == "number" and default is not None:
-            control |= number_range(
-                lambda value, name=field.name: _accepts(cls, name, value), default, kind["whole"]
-            )
+            accepts = functools.partial(_accepts, cls, field.name)
+            control |= number_range(accepts, default, kind["whole"])
         found.append(control)
     order = {name: place for place, name in enumerate(first)}
     return sorted(found, key=lambda c: order.get(c["key"].partition(".")[2], len(first)))
@@ -142,8 +142,8 @@ def number_range(
 ) -> dict[str, float | bool]:
     """The range of a slider, "low", "high" and whether it is logarithmic, "log"."""
     if whole:
-        low = 0 if accepts(0) else 1
-        return {"low": low, "high": 25 if default == 0 else max(6, 4 * default), "log": False}
+        lowest = 0 if accepts(0) else 1
+        return {"low": lowest, "high": 25 if default == 0 else max(6, 4 * default), "log": False}
     if 0.0 < default <= _SMALL:
         high = 1000.0 * default
         return {"low": default / 100.0, "high": high if accepts(high) else 1.0, "log": True}

@@ -65,7 +65,7 @@ class Game:
         if self.over:
             raise ValueError("this game is over: begin another")
         self._obs, reward, terminated, truncated, info = self._env.step(spike)
-        self._survived += int(reward)
+        self._survived += int(float(reward))
         self.over = terminated or truncated
         return {
             "survived": self._survived,

@@ -36,14 +36,14 @@ PRESETS = (
     ),
     Preset(
         "Silent for ever",
-        "All weights start at 0, so V stays 0; the modulated error trace multiplies the error by V, "
-        "and an error times nothing teaches nothing. The score is that of silence.",
+        "All weights start at 0, so V stays 0; modulated, the rule multiplies the error by V, "
+        "and an error times nothing teaches nothing. Unmodulated (dashed) it comes to life.",
         "rule=et&r.modulate=1&initial_weight=0",
         "rule=et&initial_weight=0",
     ),
     Preset(
         "Above threshold for ever",
-        "V starts above the threshold and decays too slowly to come back. Without an upward "
+        "V rises above the threshold at once and decays too slowly to come back. Without an upward "
         "crossing there is no spike; too few, says the label, and the weights go further up.",
         "n.alpha=0.02&initial_weight=1",
     ),

@@ -129,11 +129,15 @@ def _silent_mistakes(settings: Settings) -> float | None:
 
 
 def state_of(scored: dict[str, Any], recording: Any, threshold: float) -> str:
-    """ "silent" or "above" where the neuron never spikes, else "alive"."""
-    given = np.array(scored["answers"]["spikes_given"])
-    if given[:, 1:].any() or scored["answers"]["false_positives_per_1000_noise_bins"] > 0:
-        return "alive"
-    return "above" if np.mean(recording.X >= threshold) > 0.5 else "silent"
+    """ "above" where the readout stays above the threshold, "silent" where nothing was ever given.
+
+    Else "alive".
+    """
+    if np.mean(recording.X >= threshold) > 0.5:
+        return "above"
+    answers = scored["answers"]
+    given = np.array(answers["spikes_given"])[:, 1:].any()
+    return "alive" if given or answers["false_positives_per_1000_noise_bins"] > 0 else "silent"
 
 
 def described(trial: Trial) -> dict[str, Any]:

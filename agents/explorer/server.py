@@ -26,7 +26,7 @@ from gnm_env.checks import whole
 
 PAGE = Path(__file__).parent / "page"
 HOSTS = ("127.0.0.1", "localhost")
-"""Names by which a browser may call the page: whoever reaches it by another is not on this machine."""
+"""Names by which a browser may call the page: only this machine itself has these."""
 POLICY = "default-src 'self'; img-src 'self' data: blob:; frame-ancestors 'none'"
 """The page loads nothing from anywhere else."""
 CLOSED = 499
@@ -152,7 +152,7 @@ class _Play(WebSocketHandler):
     def prepare(self) -> None:
         require_own_machine(self.request.host)
 
-    async def on_message(self, message: str | bytes) -> None:  # type: ignore[override]
+    async def on_message(self, message: str | bytes) -> None:
         said = json.loads(message)
         if "begin" in said:
             self.on_close()

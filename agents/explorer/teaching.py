@@ -32,7 +32,7 @@ def teaching_signal(agent: Any, trial: Trial) -> NDArray[np.float64] | None:
     """
     if agent.model.psp_kernel() is None or trial.n_bins > MOST_BINS:
         return None
-    rule = dataclasses.replace(agent.rule, learning_rate=1.0, momentum=0.0, decay_trials=None)
+    rule = dataclasses.replace(agent.rule, learning_rate=1.0, momentum=0.0)
     if type(rule).weight_change is not in_proportion:
         return _of_potential(agent, rule, trial)
     return undone(_sums(agent, rule, trial), rule.kernel(agent.model))

@@ -211,7 +211,7 @@ class Agent:
 
     @property
     def potential(self) -> float:
-        """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
+        """Membrane potential in the bin that `act` heard last, before any reset; 0 before any.
 
         Divided by `model.threshold` it is what an environment's `potential` takes for its pictures.
         """

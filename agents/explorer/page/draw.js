@@ -93,7 +93,7 @@ export function drawTrial(canvas, result, teaching) {
   const { g, width, height } = prepared(canvas);
   const c = colours();
   const { trial, recording } = result;
-  const left = 40, right = 8, room = height - 22 - 3 * 26 - 22;
+  const left = 40, right = 16, room = height - 22 - 3 * 26 - 22;
   const y0 = 22;
   const parts = teaching ? [0.42, 0.36, 0.22] : [0.5, 0.5, 0];
   const box = (k) => ({
@@ -169,7 +169,7 @@ export function drawTrial(canvas, result, teaching) {
 export function drawCurve(canvas, result, kept) {
   const { g, width, height } = prepared(canvas);
   const c = colours();
-  const box = { x: 40, y: 22, w: width - 52, h: height - 62 };
+  const box = { x: 40, y: 22, w: width - 60, h: height - 62 };
   const all = [result, kept].filter(Boolean).map((r) => r.curve);
   const most = Math.max(1, ...all.map((curve) => curve.trials.at(-1) || 1));
   const { x, y } = axes(g, c, box, [0, most], [0, 1],
@@ -188,7 +188,7 @@ export function drawWeights(canvas, result) {
   const { g, width, height } = prepared(canvas);
   const c = colours();
   const { initial, learned } = result.weights;
-  const box = { x: 40, y: 22, w: width - 52, h: height - 62 };
+  const box = { x: 40, y: 22, w: width - 60, h: height - 62 };
   const high = Math.max(1e-9, ...learned, ...initial), low = Math.min(0, ...learned, ...initial);
   const { x, y } = axes(g, c, box, [0, learned.length], [low, 1.05 * high],
     { x: "input channel", y: "weight" }, { x: 5, y: 4 });
@@ -196,8 +196,8 @@ export function drawWeights(canvas, result) {
   learned.forEach((w, i) => {
     g.fillStyle = c.accent;
     g.fillRect(x(i), Math.min(y(w), y(0)), wide, Math.abs(y(w) - y(0)));
-    g.fillStyle = c.soft;
-    g.fillRect(x(i), y(initial[i]) - 1, wide, 2);
+    g.fillStyle = c.ink;
+    g.fillRect(x(i), y(initial[i]) - 0.75, wide, 1.5);
   });
 }
 

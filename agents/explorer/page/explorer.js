@@ -31,7 +31,7 @@ function readAddress() {
   const other = given.versus;
   delete given.versus;
   state = given;
-  versus = other === undefined ? null : { link: other, result: null };
+  versus = other ? { link: other, result: null } : null;
 }
 
 function writeAddress() {
@@ -60,7 +60,12 @@ function row(name, symbol, help) {
   label.className = "row";
   label.title = help || "";
   const span = label.appendChild(document.createElement("span"));
-  if (symbol) span.appendChild(document.createElement("em")).textContent = symbol;
+  if (symbol) {
+    const [main, index] = symbol.split("_");
+    const em = span.appendChild(document.createElement("em"));
+    em.textContent = main;
+    if (index) em.appendChild(document.createElement("sub")).textContent = index;
+  }
   span.append(name);
   return label;
 }
@@ -279,7 +284,7 @@ async function compute(query, signal) {
 const STATES = {
   alive: "",
   silent: " It never spikes: V stays below the threshold.",
-  above: " It never spikes: V stays above the threshold, and only an upward crossing is a spike.",
+  above: " V stays above the threshold, and only an upward crossing is a spike.",
 };
 
 function say(message, wrong = false) {
