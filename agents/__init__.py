@@ -14,8 +14,22 @@ from agents.evaluation import (
     noisy_performance,
 )
 from agents.history import History
-from agents.learning.aggregate_label import AggregateLabel
-from agents.learning.error_trace import ErrorTrace
+from agents.learning import (
+    MPDAL,
+    MSTDPET,
+    PSD,
+    SPAN,
+    STDP,
+    AggregateLabel,
+    Chronotron,
+    CriticalThreshold,
+    ErrorTrace,
+    PeakError,
+    PolicyGradient,
+    ReSuMe,
+    SurrogateGradient,
+    Tempotron,
+)
 from agents.neuron_agent import NeuronAgent
 from agents.neurons.gnm import GNM
 from agents.neurons.lif import LIF
@@ -29,15 +43,27 @@ from agents.training.many import train_many
 __all__ = [
     "GNM",
     "LIF",
+    "MPDAL",
     "MST",
+    "MSTDPET",
+    "PSD",
+    "SPAN",
+    "STDP",
     "AggregateLabel",
     "Answers",
     "Checkpoint",
+    "Chronotron",
+    "CriticalThreshold",
     "ErrorTrace",
     "History",
     "MistakeRate",
     "NeuronAgent",
+    "PeakError",
+    "PolicyGradient",
+    "ReSuMe",
     "Recording",
+    "SurrogateGradient",
+    "Tempotron",
     "WeightOverflow",
     "answers",
     "bootstrap_interval",

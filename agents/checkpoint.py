@@ -18,6 +18,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents import registry
+from agents.learning.rule import NoMemory
 from gnm_env.files import ArraySpec, atomic_write, open_arrays, write_arrays
 from gnm_env.task import Patterns, Task, task_arrays
 
@@ -31,6 +32,7 @@ _ARRAYS = {
     "weights": ArraySpec("f8", (None,)),
     "velocity": ArraySpec("f8", (None,)),
     "momentum": ArraySpec("f8", (None,)),
+    "rule_memory": ArraySpec("f8", (None,)),
     "patterns": ArraySpec("u1", (None,)),
 }
 _BIT_GENERATORS = {
@@ -83,7 +85,11 @@ def save_agent(
         "overflowed": bool(agent.overflowed),
         "trials": agent.trials,
     }
+    if agent.rng is not None:
+        header["agent_rng"] = agent.rng.bit_generator.state
     contents = {"weights": agent.weights, "velocity": agent.velocity}
+    if rule.memory_type is not NoMemory:
+        contents["rule_memory"] = agent.rule_memory
     for name, array in contents.items():
         if not np.isfinite(array).all():
             raise ValueError(
@@ -210,6 +216,10 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
         raise ValueError("its header does not say how far the agent was trained")
     agent = cls.rebuilt(model, rule, n_inputs, None if bounds is None else tuple(bounds))
     agent.weights, agent.velocity = weights, velocity
+    if "agent_rng" in header:
+        agent.rng = _generator(header["agent_rng"])
+    if "rule_memory" in arrays:
+        agent.rule_memory = arrays["rule_memory"]
     agent._trials, agent.overflowed = trials, header["overflowed"]
     return agent
 

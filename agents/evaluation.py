@@ -12,14 +12,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.policy import as_agent
 from agents.training.batch import Answers
+from agents.training.loop import MAX_TRIALS
 from agents.training.many import lane_groups, thread_count
 from agents.training.source import source_of
-from gnm_env.checks import whole
+from gnm_env.checks import MAX_BINS, MAX_SEED, flag, require_memory, shown, whole
 from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import Patterns, Task
 
 ANSWERED = 2_000
 """Trials of a stream that `answers` hears unless told otherwise."""
+
+MAX_RUNS = 10_000_000
+"""Most streams of one measurement."""
+
+MAX_RESAMPLES = 1_000_000_000
+"""Most resamples of a bootstrap."""
 
 
 def noisy_performance(
@@ -42,8 +49,8 @@ def noisy_performance(
         agent: an agent, or anything with Stable-Baselines3's `predict` that hears the bits; or a
             list of such.
         task, patterns: what they hear.
-        runs: number of streams.
-        cap: most bins per stream.
+        runs: number of streams, at most MAX_RUNS.
+        cap: most bins per stream, at most 10⁹.
         seed: of the streams. Space the seeds of different measurements by at least `runs`.
         threads: number of threads; None: one per core.
         shared: whether the agents of a list hear the same streams. If not, agent b hears those of
@@ -51,10 +58,18 @@ def noisy_performance(
 
     Returns:
         int64 (runs,), or (agents, runs) for a list.
+
+    Raises:
+        ValueError: if a number is out of range, memory is short, or an agent does not fit the task
+            or answers with anything but one spike or none for each stream.
     """
-    runs, cap = whole("runs", runs, low=1), whole("cap", cap, low=1)
-    seed = whole("seed", seed, low=0)
+    runs = whole("runs", runs, low=1, high=MAX_RUNS)
+    cap = whole("cap", cap, low=1, high=MAX_BINS)
+    seed, shared = whole("seed", seed, low=0), flag("shared", shared)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
+    require_memory(
+        f"{runs:,} runs of {len(agents):,} agents", 8.0 * runs * len(agents), "run fewer"
+    )
     bins = np.empty((len(agents), runs), np.int64)
     threads = thread_count(threads)
     source = source_of(task, patterns)
@@ -98,14 +113,18 @@ def answers(
     Args:
         agent: as for `noisy_performance`.
         task, patterns: what is heard; or a data set of trials, `gnm_env.Trials`, in place of both.
-        trials: number of trials; None: 2,000, or each trial of the data set once.
+        trials: number of trials, at most 10¹²; None: 2,000, or each trial of the data set once.
         seed: of the stream; the order of a data set is its own.
+
+    Raises:
+        ValueError: as for `noisy_performance`.
     """
     source = source_of(task, patterns)
     once = trials is None
     if trials is None:
         trials = source.n_trials or ANSWERED
-    trials, seed = whole("trials", trials, low=1), whole("seed", seed, low=0)
+    trials = whole("trials", trials, low=1, high=MAX_TRIALS)
+    seed = whole("seed", seed, low=0)
     agents = [as_agent(one) for one in (agent if isinstance(agent, Sequence) else [agent])]
     units = lane_groups(agents, source, threads=1)
     parts = []
@@ -137,10 +156,21 @@ class MistakeRate:
 
 
 def mistake_rate(survived: ArrayLike, cap: int = MAX_EPISODE_BINS) -> MistakeRate:
-    """The mistake rate of runs that survived so many bins; those at the cap made no mistake."""
+    """The mistake rate of runs that survived so many bins; those at the cap made no mistake.
+
+    Raises ValueError unless there is at least one run, and all are whole numbers in 0 … cap.
+    """
     from scipy.stats import chi2
 
-    bins = np.asarray(survived)
+    cap = whole("cap", cap, low=1)
+    bins = _numbers("survived", survived)
+    if bins.dtype.kind == "f" and np.all(bins == np.floor(bins)):
+        bins = bins.astype(np.int64)
+    if bins.dtype.kind not in "iu" or bins.min() < 0 or bins.max() > cap:
+        raise ValueError(
+            f"survived must be whole numbers of bins in 0 … cap = {cap:,}, got {shown(survived)}; "
+            "give the cap that the runs were measured with"
+        )
     mistakes = int(np.sum(bins < cap))
     # Who errs in the very first bin of every run has survived none: count those bins.
     exposure = max(int(bins.sum()), mistakes, 1) / 10_000
@@ -152,14 +182,34 @@ def mistake_rate(survived: ArrayLike, cap: int = MAX_EPISODE_BINS) -> MistakeRat
 def bootstrap_interval(
     values: ArrayLike, *, resamples: int = 10_000, seed: int = 0
 ) -> tuple[float, float]:
-    """95 % percentile bootstrap interval of the mean of `values`, (n,)."""
-    sample = np.asarray(values, np.float64)
-    rng = np.random.default_rng(seed)
+    """95 % percentile bootstrap interval of the mean of `values`, (n,), n >= 1 finite numbers.
+
+    Raises ValueError for other values, a number out of range, or if memory is short.
+    """
+    sample = _numbers("values", values).astype(np.float64)
+    if sample.ndim != 1:
+        raise ValueError(f"values must be a row of numbers, got shape {sample.shape}")
+    resamples = whole("resamples", resamples, low=1, high=MAX_RESAMPLES)
+    rng = np.random.default_rng(whole("seed", seed, low=0, high=MAX_SEED))
+    need = 1.6 * resamples * len(sample) + 16.0 * resamples
+    require_memory(f"{resamples:,} resamples of {len(sample):,} values", need, "take fewer")
     # In ten parts, which take a tenth of the memory.
-    parts = np.array_split(np.empty(whole("resamples", resamples, low=1)), 10)
+    sizes = np.full(10, resamples // 10) + (np.arange(10) < resamples % 10)
     chunks = [
-        sample[rng.integers(0, len(sample), (len(part), len(sample)))].mean(axis=1)
-        for part in parts
+        sample[rng.integers(0, len(sample), (size, len(sample)))].mean(axis=1) for size in sizes
     ]
     low, high = np.percentile(np.concatenate(chunks), (2.5, 97.5))
     return float(low), float(high)
+
+
+def _numbers(name: str, values: Any) -> NDArray[Any]:
+    """`values` as an array of at least one finite number, or ValueError."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of unequal length
+        array = np.array(None)
+    if array.dtype.kind not in "fiub" or array.ndim == 0 or array.size == 0:
+        raise ValueError(f"{name} must be at least one number, in a row, got {shown(values)}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {shown(values)}: leave out what is missing")
+    return array

@@ -93,6 +93,16 @@ class Model(ABC):
     def threshold(self) -> float:
         """The readout's threshold for an output spike, in units of the readout."""
 
+    @property
+    def reads_V(self) -> bool:
+        """Whether the readout X is the membrane potential V itself. False is safe, but slower."""
+        return False
+
+    @property
+    def readout_lag(self) -> int:
+        """Bins by which the readout is behind the potential that it shows."""
+        return 0
+
     @abstractmethod
     def advance(self) -> tuple[str, Any]:
         """A label that tells this compiled step from every other, and the step."""

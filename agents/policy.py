@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from agents.training.batch import Answers
 from agents.training.source import Source, TaskSource
 from agents.training.streams import MOST_SPIKES
+from gnm_env.checks import shown
 from gnm_env.trial import Trial
 
 TRIALS_AT_ONCE = 500
@@ -81,7 +82,7 @@ class PolicyBatch:
         survived, alive = np.zeros(runs, np.int64), np.ones(runs, np.bool_)
         state, begins = None, np.ones(runs, np.bool_)
         for _ in range(cap):
-            actions, state = self._policy.predict(bits, state, begins, True)
+            actions, state = self._answered_by_policy(bits, state, begins)
             bits, _, mistaken, _, _ = streams.step(actions)
             begins = np.zeros(runs, np.bool_)
             # A stream that is lost goes on, unheeded: the batch keeps its shape, and `state` too.
@@ -132,9 +133,27 @@ class PolicyBatch:
         spikes = np.zeros((n_bins, n), np.bool_)
         state, begins = None, np.ones(n, np.bool_)
         for t in range(n_bins):
-            spikes[t], state = self._policy.predict(raster[t], state, begins, True)
+            spikes[t], state = self._answered_by_policy(raster[t], state, begins)
             begins = np.zeros(n, np.bool_)
         return spikes
+
+    def _answered_by_policy(
+        self, bits: NDArray[np.int8], state: Any, begins: NDArray[np.bool_]
+    ) -> tuple[NDArray[Any], Any]:
+        """What the policy answers to one bin of n streams, (n,), and its state; checked."""
+        given = self._policy.predict(bits, state, begins, True)
+        if not isinstance(given, tuple) or len(given) != 2:
+            raise ValueError(
+                f"predict must return the actions and the state, got {shown(given)}; "
+                "return (actions, None) where there is no state"
+            )
+        actions = np.asarray(given[0])
+        if actions.shape != (len(bits),) or not np.isin(actions, (0, 1)).all():
+            raise ValueError(
+                f"predict must answer {len(bits)} streams with one action each, 0 or 1, "
+                f"got {shown(given[0])}"
+            )
+        return actions, given[1]
 
 
 class _Bare(PolicyAgent):
@@ -146,11 +165,13 @@ class _Bare(PolicyAgent):
 
 def as_agent(agent: Any) -> Any:
     """`agent`, or what makes an agent of a policy; ValueError if it is neither."""
+    if isinstance(agent, type):
+        raise ValueError(f"an agent must be an instance, got the class {agent.__name__}")
     if hasattr(agent, "group_key"):
         return agent
     if isinstance(agent, Policy):
         return _Bare(agent)
     raise ValueError(
         f"an agent must have a method predict(observation, state, episode_start, deterministic), "
-        f"got {type(agent).__name__}"
+        f"got {shown(agent)}"
     )

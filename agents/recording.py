@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.checks import shown
 from gnm_env.trial import Trial
 
 
@@ -32,7 +33,21 @@ class Recording:
 
 
 def record(agent: Any, trial: Trial) -> Recording:
-    """What `agent` does in `trial`, starting from rest, learning off. Changes nothing."""
+    """What `agent` does in `trial`, starting from rest, learning off. Changes nothing.
+
+    Raises ValueError if `agent` is none whose variables can be recorded, or `trial` is no trial
+    that it can hear.
+    """
+    if not callable(getattr(agent, "record", None)) or isinstance(agent, type):
+        raise ValueError(
+            f"agent must be an agent, such as NeuronAgent makes, got {shown(agent)}; "
+            "give a neuron weights and a rule first: NeuronAgent(neuron, rule, n_inputs)"
+        )
+    if not isinstance(trial, Trial):
+        raise ValueError(
+            f"trial must be a gnm_env.Trial, got {shown(trial)}; "
+            "make one with draw_trial, or of your own data with Trial.from_dense"
+        )
     if trial.n_inputs != agent.n_inputs:
         raise ValueError(
             f"the trial must have as many channels as the agent has inputs, {agent.n_inputs}, "

@@ -216,14 +216,17 @@ def _row_address(
         sizes = [*cgutils.unpack_tuple(builder, structure.shape), context.get_constant(_INTP, 1)]
         cgutils.do_boundscheck(context, builder, row, sizes[0])
         cgutils.do_boundscheck(context, builder, context.get_constant(_INTP, width - 1), sizes[1])
+    if array_type.layout == "C" and array_type.ndim == 2:
+        # Rows of a block that is no part of a wider one hold `width` numbers: known beforehand.
+        return builder.gep(structure.data, [builder.mul(row, context.get_constant(_INTP, width))])
     stride = cgutils.unpack_tuple(builder, structure.strides)[0]
-    base = builder.ptrtoint(structure.data, ir.IntType(64))
-    return builder.add(base, builder.mul(stride, row))
+    data = builder.bitcast(structure.data, ir.IntType(8).as_pointer())
+    return builder.gep(data, [builder.mul(stride, row)])
 
 
 def _load_row(context: Any, builder: Any, array_type: Any, array: Any, row: Any, width: int) -> Any:
     address = _row_address(context, builder, array_type, array, row, width)
-    value = builder.load(builder.inttoptr(address, _vector(width).as_pointer()))
+    value = builder.load(builder.bitcast(address, _vector(width).as_pointer()))
     value.align = 8  # rows are aligned as their numbers are, not as whole vectors
     return value
 
@@ -231,7 +234,7 @@ def _load_row(context: Any, builder: Any, array_type: Any, array: Any, row: Any,
 def _store_row(context: Any, builder: Any, array: Any, value: Any, row: Any, x: Any) -> None:
     width = x.type.count if isinstance(x.type, ir.VectorType) else 1
     address = _row_address(context, builder, array, value, row, width)
-    builder.store(x, builder.inttoptr(address, x.type.as_pointer())).align = 8
+    builder.store(x, builder.bitcast(address, x.type.as_pointer())).align = 8
 
 
 @_intrinsic

@@ -103,6 +103,13 @@ def choice(name: str, value: Any, options: tuple[str, ...]) -> str:
     return str(value)
 
 
+def flag(name: str, value: Any) -> bool:
+    """`value` if it is True or False, or ValueError: texts and numbers say neither."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
 def whole_array(
     name: str, values: Any, low: int, high: int, dtype: type = np.int64
 ) -> NDArray[Any]:

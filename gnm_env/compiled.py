@@ -154,7 +154,12 @@ class _Cache(FunctionCache):
         self._cache_file = _Files(Path(self._cache_path), self._impl.filename_base)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        self._cache_file.stamp = f"{_BUILD} {_digest(self._function)}"
+        try:
+            self._cache_file.stamp = f"{_BUILD} {_digest(self._function)}"
+        except OSError as error:  # a source file has gone since it was imported
+            self.disable()
+            _warn(f"what {self._function.__qualname__} rests on cannot be read ({error})")
+            return None
         try:
             return super().load_overload(sig, target_context)
         except Exception as error:  # whatever a file says that was whole, and yet is of no use

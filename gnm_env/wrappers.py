@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from gnm_env.base.env import spike_from
+from gnm_env.base.env import array_of, spike_from
 from gnm_env.checks import real, require_memory, shown, whole
 from gnm_env.compiled import compiled
 
@@ -419,7 +419,7 @@ class VectorRisingEdge(VectorWrapper[Any, NDArray[Any], Any, Any, Any], RecordCo
         return begun
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        levels = np.array(actions)
+        levels = array_of(actions)
         if (
             levels.dtype.kind not in "iub"
             or levels.shape != (self.num_envs,)

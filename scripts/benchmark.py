@@ -37,6 +37,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 SECTIONS: dict[str, tuple[str, ...]] = {
     "training": ("training:side_by_side",),
+    "rules": ("training:rules",),
     "alone": ("training:alone",),
     "network": ("training:network",),
     "continuous": ("training:continuous",),

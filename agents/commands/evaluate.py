@@ -31,6 +31,7 @@ def options(parser: Parser) -> None:
         help="trials for the table of responses (default 2000)")
     share(parser, "--seed", default=EVALUATION_SEED, help="of the first stream")
     share(parser, "--pattern-seed", help="other patterns than those it was saved with")
+    share(parser, "--import")
     share(parser, "--trust")
     # fmt: on
 

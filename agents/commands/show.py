@@ -20,6 +20,7 @@ def options(parser: Parser) -> None:
     add = parser.add_argument
     add("what", choices=("hysteresis", "responses"), nargs="?", default="hysteresis")
     add("checkpoint", type=Path, nargs="?", help="for responses: a saved agent")
+    share(parser, "--import")
     share(parser, "--out", default=Path("runs/show"))
 
 

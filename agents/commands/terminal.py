@@ -105,6 +105,17 @@ def pattern_seeds(text: str) -> tuple[int, ...]:
     return tuple(seeds)
 
 
+def module(place: str) -> ModuleType:
+    """A module, or a file, that defines neurons or rules; importing it makes them known."""
+    from agents.registry import load_module
+
+    try:
+        found: ModuleType = load_module(place)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return found
+
+
 SHARED: dict[str, dict[str, Any]] = {
     "--json": {"action": "store_true", "help": "end with one line of JSON"},
     "--seed": {"type": at_least(0), "default": 0, "metavar": "N"},
@@ -126,6 +137,10 @@ SHARED: dict[str, dict[str, Any]] = {
         " use it on networks that you trust alone",
     },
     "--repair": {"action": "store_true", "help": "compute damaged blocks again"},
+    "--import": {
+        "type": module, "action": "append", "dest": "modules", "metavar": "MODULE",
+        "help": "module or file.py with a neuron or rule of yours that the agent has",
+    },
     "--trust": {
         "action": "store_true",
         "help": "open a model of Stable-Baselines3 that no run of yours wrote: it holds pickled "

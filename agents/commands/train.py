@@ -58,6 +58,7 @@ def options(parser: Parser) -> None:
         help="go on from a saved agent, its task, its patterns and its place in the stream")
     add("--checkpoint-every", type=float, default=60.0, metavar="SECONDS",
         help="save the agent so often while it learns (default 60; 0: in every block of trials)")
+    share(parser, "--import")
     share(parser, "--out", default=Path("runs/train"))
     fields.add_options(parser, {"the task": Task, **_groups(parser)})
     # fmt: on
@@ -99,15 +100,19 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
         "trials": trials,
         "seconds": time.monotonic() - began,
         "checkpoint": str(options.out / AGENT),
-        "picture": str(options.out / "training.png"),
+        "picture": None,
         "stopped": False,
     }
-    plot(agent, task, patterns, history).savefig(output.fresh / "training.png")
+    try:
+        plot(agent, task, patterns, history).savefig(output.fresh / "training.png")
+        result["picture"] = str(options.out / "training.png")
+    except ImportError as error:
+        print(f"no picture: {error}\n")
     with atomic_write(output.fresh / "score.json") as file:
         file.write(json.dumps(result, indent=2).encode())
     output.finish()
     print(report(result))
-    print(f"\nin {options.out}: {AGENT}, learning_curve.csv, score.json and training.png")
+    print(f"\nin {options.out}: {', '.join(sorted(path.name for path in options.out.iterdir()))}")
     return result
 
 

@@ -10,6 +10,7 @@ A subject is a module beside this one that has any of
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -82,10 +83,18 @@ def experiment(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Ex
         if seeds:
             raise ValueError(f"{name} has pattern seeds of its own: leave --seeds out")
         return found
-    made = found(size, seeds) if callable(found) else found
+    made = found(size, seeds) if callable(found) and _takes_two(found) else found
     if not isinstance(made, Experiment):
         raise ValueError(
             f"{name} must be an Experiment, or a function of size and pattern seeds that makes "
             f"one, got {made!r}"
         )
     return made
+
+
+def _takes_two(function: Callable[..., Any]) -> bool:
+    try:
+        inspect.signature(function).bind("size", "seeds")
+    except (TypeError, ValueError):
+        return False
+    return True

@@ -332,7 +332,9 @@ def _refuse_other_settings(folder: Path, stored: Any, wanted: Any) -> None:
 def _difference(stored: Any, wanted: Any, path: str = "") -> str:
     """The first place where two settings differ, in words; empty where they are equal."""
     if isinstance(stored, dict) and isinstance(wanted, dict):
-        for key in [*stored, *(key for key in wanted if key not in stored)]:
+        # An option that a later version added, and that is not used, makes no difference.
+        added = [key for key, value in wanted.items() if key not in stored and value is not None]
+        for key in [*stored, *added]:
             inner = _difference(
                 stored.get(key, "nothing"), wanted.get(key, "nothing"), f"{path}.{key}".lstrip(".")
             )

@@ -88,9 +88,11 @@ def _knock(address: str) -> None:
     A connection of its own: a Client that cannot connect complains again when it is collected.
     """
     from distributed.comm import connect
+    from distributed.security import Security
 
     async def knock() -> None:
-        comm = await connect(address, timeout=CONNECTION_SECONDS)
+        security = Security().get_connection_args("client")  # certificates, for tls://
+        comm = await connect(address, timeout=CONNECTION_SECONDS, **security)
         await comm.close()
 
     try:

@@ -10,11 +10,24 @@ y(t). It is one file beside this one, or a class of your own: a frozen dataclass
   `weight_change(p, static, c, eligibility)`, if Δ_i is to be anything but λ·ε_i;
 - `teach(p, trial, y) -> None`: where it needs the whole trial. It is handed the trial of one
   neuron (`agents.learning.teaching.HeardTrial`) and writes y, (T,), which is all 0 before;
+- `bin_signal(p, b) -> y(t)`: likewise side by side, where it takes the readout, the output or the
+  rule's own numbers as well (`BinOfTrial`);
+- `side_by_side(p, c, trial, log, eligibility) -> mask`: where no y(t) says it; it writes ε in many
+  lanes at once, from the correction c and the log of the trial (`agents.training.trial`), and
+  returns in which there is anything to learn;
 - `change(p, trial, eligibility) -> bool`: where no y(t) says it. It writes ε, (N,), itself, and
   returns whether there is anything to learn.
 
 `p` holds the rule's own numbers by name. Rate, momentum and bounds are the same for every rule and
 live in `momentum.py`.
+
+A rule may have a memory, some numbers for each neuron that last from trial to trial and are kept in
+checkpoints: their names are the fields of its `memory_type`, 0 at first. `weigh(p, told, memory) ->
+(correction, memory)` makes of what the rule is told (see CORRECTIONS) what it learns by, 0 being
+nothing; it is written like `bin_signal`.
+
+`explore(p, V, threshold, uniform) -> bool` draws the output of a bin while the rule learns, for
+neurons that take no notice of their own output; written likewise.
 """
 
 from __future__ import annotations
@@ -69,6 +82,27 @@ class RuleParameters(NamedTuple):
     """Fraction of the learning rate that each trial takes away; 0 for a constant rate."""
 
 
+class BinOfTrial(NamedTuple):
+    """What happened in a bin, for `bin_signal`."""
+
+    V: Any
+    """Membrane potential."""
+    X: Any
+    """Readout."""
+    E: Any
+    """Error trace, where the rule uses it; else the correction, the same in every bin."""
+    z: Any
+    """Output, where the rule uses it."""
+    threshold: Any
+    """Of the readout."""
+
+
+class NoMemory(NamedTuple):
+    """The memory of a rule that has none."""
+
+    unused: Any
+
+
 @inlined
 def sign_of_error(outcome: Outcome) -> Any:
     """+1 where more output was owed, −1 where less, 0 where the sum was right."""
@@ -91,6 +125,13 @@ def any_error(outcome: Outcome) -> Any:
 
 
 @inlined
+def reward_less_one(outcome: Outcome) -> Any:
+    """−|label − emitted| − 1: a reward of 0 can teach, too."""
+    error = outcome.label - outcome.emitted
+    return where(error < 0.0, error, -error) - 1.0
+
+
+@inlined
 def always(outcome: Outcome) -> Any:
     """1: every trial teaches."""
     return like(1.0, outcome.emitted)
@@ -99,7 +140,7 @@ def always(outcome: Outcome) -> Any:
 CORRECTIONS: Mapping[str, Any] = {
     "sign": sign_of_error,
     "label": whole_error,
-    "reward": always,
+    "reward": reward_less_one,
     "presentations": any_error,
     "none": always,
 }
@@ -139,20 +180,33 @@ class Rule(ABC):
     feedback: ClassVar[str]
     """What the rule may know of a trial; a key of FEEDBACK."""
     uses_error: ClassVar[bool] = False
-    """Whether its teaching signal takes the error trace E(t)."""
+    """Whether its teaching signal takes the error trace E(t), if presentations are known."""
+    uses_output: ClassVar[bool] = False
+    """Whether a `bin_signal` or `side_by_side` takes the output of each bin."""
+    needs_spikes: ClassVar[bool] = False
+    """Whether it is for output spikes only, not for amounts."""
+    binary: ClassVar[bool] = False
+    """Whether it is for labels 0 and 1 only."""
+    learns_when_right: ClassVar[bool] = False
+    """Whether a trial may teach that has the right output in every segment."""
     parameters_type: ClassVar[Any] = _OwnNumbers()
+    memory_type: ClassVar[Any] = NoMemory
     teaching_signal: ClassVar[Any] = None
+    bin_signal: ClassVar[Any] = None
+    side_by_side: ClassVar[Any] = None
+    weigh: ClassVar[Any] = None
+    explore: ClassVar[Any] = None
     weight_change: ClassVar[Any] = in_proportion
     teach: ClassVar[Any] = None
     change: ClassVar[Any] = None
     block_change: ClassVar[Any] = None
     """As `agents.training.change.pointwise_change_template`: for models that are no neurons."""
-    _pointwise: ClassVar[dict[str, Any]]
+    _compiled: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        functions = ("teaching_signal", "teach", "change", "weight_change", "block_change")
-        registry.register("rule", cls, functions)
+        ways = ("teaching_signal", "bin_signal", "side_by_side", "teach", "change", "block_change")
+        registry.register("rule", cls, (*ways, "weight_change", "weigh", "explore"))
         if getattr(cls, "name", None) is None:
             return
         feedback = getattr(cls, "feedback", None)
@@ -160,19 +214,19 @@ class Rule(ABC):
             raise ValueError(
                 f"{cls.__name__}.feedback must be one of {', '.join(FEEDBACK)}, got {feedback!r}"
             )
-        if not any(getattr(cls, f) for f in ("teaching_signal", "teach", "change", "block_change")):
+        if not any(getattr(cls, way) for way in ways):
             raise ValueError(
                 f"{cls.__name__} must say what it teaches: by teaching_signal(static, V, E), "
                 "teach(p, trial, y) or change(p, trial, eligibility); see agents.learning.rule"
             )
-        if cls.teaching_signal is not None:
-            signal = portable(cls.teaching_signal)
-            cls._pointwise = {"teaching_signal": signal, "weight_change": cls.weight_change}
+        names = ("teaching_signal", "bin_signal", "side_by_side", "weigh", "explore")
+        parts = {name: getattr(cls, name) for name in names}
+        cls._compiled = {name: part and portable(part) for name, part in parts.items()}
 
     @classmethod
-    def compiled_pointwise(cls) -> dict[str, Any]:
-        """`teaching_signal` and `weight_change`, compiled."""
-        return cls._pointwise
+    def compiled_parts(cls) -> dict[str, Any]:
+        """Its functions for neurons side by side, compiled; None where it has none."""
+        return {**cls._compiled, "weight_change": cls.weight_change}
 
     def __post_init__(self) -> None:
         real("learning_rate", self.learning_rate, low=0.0)
@@ -188,6 +242,11 @@ class Rule(ABC):
         Raises ValueError where `model` cannot learn by this rule.
         """
         own = model.psp_kernel()
+        if self.needs_spikes and model.graded:
+            raise ValueError(
+                f"{type(self).__name__} is for neurons that spike; a {type(model).__name__} gives "
+                "amounts, and learns by AggregateLabel, ErrorTrace or SurrogateGradient"
+            )
         if own is None:
             raise ValueError(
                 f"{type(self).__name__} is for neurons whose potential is linear in their inputs; "
@@ -199,11 +258,27 @@ class Rule(ABC):
         """The numbers of `RuleParameters`, and below them the rule's own."""
         kernel = self.kernel(model)
         decay = 0.0 if self.decay_trials is None else 1.0 / self.decay_trials
-        own = (float(getattr(self, name, 0.0)) for name in self.parameters_type._fields)
         return (
             self.learning_rate, self.momentum, *bounds,
-            kernel.slow, kernel.fast, kernel.scale, decay, *own,
+            kernel.slow, kernel.fast, kernel.scale, decay, *self.own_numbers(model),
         )  # fmt: skip
+
+    def own_numbers(self, model: Model) -> tuple[float, ...]:
+        """The numbers of `parameters_type`: the fields of these names."""
+        return tuple(float(getattr(self, name, 0.0)) for name in self.parameters_type._fields)
+
+    @property
+    def variant(self) -> tuple[str, bool]:
+        """What a rule of one class may choose when it is made: `feedback`, `learns_when_right`."""
+        return self.feedback, self.learns_when_right
+
+    def check_label(self, label: float) -> None:
+        """ValueError if the rule cannot learn from a trial with this label."""
+        if self.binary and label > 1.0:
+            raise ValueError(
+                f"a {type(self).__name__} learns from trials labelled 0 or 1, got label {label:g}: "
+                "use a rule such as CriticalThreshold"
+            )
 
     def check_source(self, source: Any) -> None:
         """ValueError if the rule cannot learn from what `source` tells."""
@@ -212,6 +287,11 @@ class Rule(ABC):
                 f"{type(self).__name__} needs to know where the presentations were, and of these "
                 "trials only the labels are known: use a rule such as AggregateLabel or "
                 "CriticalThreshold"
+            )
+        if self.binary and not source.binary:
+            raise ValueError(
+                f"a {type(self).__name__} learns from trials labelled 0 or 1, and of these some "
+                "have, or may have, labels above 1: use a rule such as CriticalThreshold"
             )
 
     def static(self, n_inputs: int) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from agents.model import Arrays
 from agents.simd import repeated, unpack
-from agents.training.slots import THRESHOLD, Parameters, State, advance
+from agents.training.slots import BIEXPONENTIAL, THRESHOLD, Parameters, State, advance
 from gnm_env.compiled import compiled
 
 
@@ -30,6 +30,8 @@ class HeardTrial(NamedTuple):
 
     V: NDArray[np.float64]
     """Membrane potential, (T,), before any reset that the bin's spike causes."""
+    X: NDArray[np.float64]
+    """Readout, (T,), which is compared with the threshold: V itself, but for a GNM that reads D."""
     spikes: NDArray[np.float64]
     """1 in the bins with an output spike, else 0, (T,); amounts where output is graded."""
     channels: NDArray[np.int32]
@@ -41,13 +43,19 @@ class HeardTrial(NamedTuple):
     counts: NDArray[np.float64]
     """Output in each segment."""
     error: float
-    """By feedback: the sign of label − emitted; label − emitted; the reward; else 1."""
+    """By feedback: the sign of label − emitted; label − emitted; the reward; else 1. Where the rule
+    weighs it, what has come of it."""
     threshold: float
-    """Of the readout, which is V but for a GNM with readout "D"."""
+    """Of the readout."""
+    lag: int
+    """Bins by which X is behind the potential that it shows: a lesson for X(t) is one for the V of
+    bin t − lag, where y belongs; see `agents.learning.peaks.mark`."""
     slow: float
     """The presynaptic trace: slow^t, or scale·(slow^t − fast^t); see `agents.model.PSPKernel`."""
     fast: float
     scale: float
+    memory: NDArray[np.float64]
+    """What the rule remembers from trial to trial, a number for each field of its `memory_type`."""
     again: Again
 
 
@@ -55,6 +63,36 @@ class HeardTrial(NamedTuple):
 def count_of(trial: HeardTrial) -> int:
     """Output spikes in the whole trial."""
     return int(trial.counts.sum() + 0.5)
+
+
+def accumulate(trial: HeardTrial, y: NDArray[np.float64], eligibility: NDArray[np.float64]) -> bool:
+    """ε_i = Σ_t x_i(t) y(t), for rules with a `change`; False if y is 0 throughout.
+
+    `change` calls it by this name; it is compiled for each kind of presynaptic trace.
+    """
+    raise NotImplementedError("accumulate is for compiled rules")
+
+
+def accumulate_template(
+    trial: HeardTrial, y: NDArray[np.float64], eligibility: NDArray[np.float64]
+) -> bool:
+    """See `accumulate`."""
+    for i in range(len(eligibility)):
+        eligibility[i] = 0.0
+    last = len(y) - 1
+    while last >= 0 and y[last] == 0.0:
+        last -= 1
+    slow = 0.0
+    fast = 0.0
+    for t in range(last, -1, -1):
+        slow = y[t] + trial.slow * slow
+        gain = slow
+        if BIEXPONENTIAL:
+            fast = y[t] + trial.fast * fast
+            gain = trial.scale * (slow - fast)
+        for e in range(trial.offsets[t], trial.offsets[t + 1]):
+            eligibility[trial.channels[e]] += gain
+    return last >= 0
 
 
 def replay(

@@ -58,7 +58,7 @@ def error_trace_of(
     """E(t) of one network in a trial, (T,), from the potential V (T,) of its readout."""
     n_bins, n_segments = len(V), len(trial.target)
     potential, above = V.copy().reshape(n_bins, 1), np.zeros((n_bins, 1))
-    log = TrialLog(potential, above, above, np.zeros((n_segments, 1)))
+    log = TrialLog(potential, above, above, above, np.zeros((n_segments, 1)))
     E = np.zeros(n_bins)
     for segment in range(n_segments):
         for t in range(trial.edges[segment], trial.edges[segment + 1]):
@@ -98,6 +98,7 @@ def backpropagated_change(
     g_j = np.zeros((H, WIDTH))
     g_v = np.zeros((H, WIDTH))
     g_V = zero
+    next_total = zero
     blame = zero
     for segment in range(len(trial.target) - 1, -1, -1):
         for t in range(trial.edges[segment + 1] - 1, trial.edges[segment] - 1, -1):
@@ -110,9 +111,7 @@ def backpropagated_change(
                     store(gradient, i, load(gradient, i, zero) + g_V)
             else:
                 row = 2 * H * t
-                total = zero
-                for k in range(H):
-                    total = total + load(g_v, k, zero)
+                total, next_total = next_total, zero
                 for k in range(H):
                     of_current = load(gradient, u + k, zero) + g_V * load(notes, row + H + k, zero)
                     store(gradient, u + k, of_current)
@@ -120,17 +119,23 @@ def backpropagated_change(
                     store(g_j, k, g)
                     before = load(g_v, k, zero)
                     g_z = g - p.inhibition * (total - before)
-                    store(g_v, k, load(notes, row + k, zero) * g_z + keep * before)
+                    g_z = load(notes, row + k, zero) * g_z + keep * before
+                    store(g_v, k, g_z)
+                    next_total = next_total + g_z
                 for e in range(trial.offsets[t], trial.offsets[t + 1]):
                     W = trial.channels[e] * H
                     for k in range(H):
                         store(gradient, W + k, load(gradient, W + k, zero) + load(g_v, k, zero))
-    factor = load(scratch.rates, 0, zero)
-    for i in range(u):
-        store(gradient, i, factor * numbers.rate_hidden * load(gradient, i, zero))
-    for i in range(u, len(gradient)):
-        store(gradient, i, factor * numbers.rate_output * load(gradient, i, zero))
-    clip_by_norm(gradient, numbers.max_step, zero)
+    rate_hidden = load(scratch.rates, 0, zero) * numbers.rate_hidden
+    rate_output = load(scratch.rates, 0, zero) * numbers.rate_output
+    squares = zero
+    for i in range(len(gradient)):
+        change = (rate_hidden if i < u else rate_output) * load(gradient, i, zero)
+        squares = squares + change * change
+        store(gradient, i, change)
+    # Well below the limit, which most steps are, there is no need to look more closely.
+    if any_lane(negated(squares < 0.999 * numbers.max_step * numbers.max_step)):
+        clip_by_norm(gradient, numbers.max_step, zero)
     c = load(scratch.corrections, 0, zero)
     store(scratch.corrections, 0, where(blame > 0.0, c, zero))
 

@@ -10,7 +10,7 @@ import numpy as np
 from agents.learning.rule import Rule, decay_option
 from agents.model import Model, PSPKernel
 from agents.network.backpropagation import RuleNumbers, backpropagated_change
-from agents.network.dynamics import NetworkParams, State, advance, largest_ratio
+from agents.network.dynamics import NetworkParams, State, advance_for, largest_ratio
 from gnm_env.checks import choice, real, whole
 
 MAX_HIDDEN = 10_000
@@ -69,6 +69,11 @@ class Network(Model):
         for name in ("theta_b", "theta_r"):
             real(name, getattr(self, name), above=0.0)
         real("h", self.h, low=1.0)
+        if not np.isfinite(np.float64(self.h) / np.float64(self.theta_b)):
+            raise ValueError(
+                f"h / theta_b, the steepness of the Hill function, must be finite, got h = "
+                f"{self.h:g} and theta_b = {self.theta_b:g}: choose a larger theta_b"
+            )
 
     @property
     def width(self) -> int:
@@ -87,11 +92,11 @@ class Network(Model):
         )  # fmt: skip
 
     def static(self, n_inputs: int) -> tuple[int, ...]:
-        """Inputs, hidden neurons, and whether the Hill exponent is the usual one, 4."""
-        return (n_inputs, self.width, int(self.h == 4.0))
+        """Inputs and hidden neurons."""
+        return (n_inputs, self.width)
 
     def advance(self) -> tuple[str, Any]:
-        return "network", advance
+        return advance_for(self.h == 4.0, self.theta_b == 1.0)
 
     def n_weights(self, n_inputs: int) -> int:
         """N·H + H, or N without a hidden layer."""

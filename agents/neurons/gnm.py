@@ -137,6 +137,15 @@ class GNM(Neuron):
     def threshold(self) -> float:
         return self.theta_r
 
+    @property
+    def reads_V(self) -> bool:
+        return self.readout == "V"
+
+    @property
+    def readout_lag(self) -> int:
+        """1 for D, which is made of the potential of the bin before."""
+        return int(self.readout == "D")
+
     def parameters(self) -> tuple[float, ...]:
         return (
             (1.0 - self.eta) * self.alpha,

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
-from gnm_env.checks import real, whole
+from gnm_env.checks import MAX_BINS, real, whole
 from gnm_env.compiled import inlined
 
 
@@ -44,7 +44,7 @@ class LIF(Neuron):
 
     Attributes:
         alpha: α, decay of the membrane potential per bin, 0 … 1.
-        refractory: bins after an output spike whose input is ignored.
+        refractory: bins after an output spike whose input is ignored, at most MAX_BINS.
         theta: ϑ, threshold, in membrane-potential units.
     """
 
@@ -60,12 +60,16 @@ class LIF(Neuron):
 
     def __post_init__(self) -> None:
         real("alpha", self.alpha, low=0.0, high=1.0)
-        whole("refractory", self.refractory, low=0)
+        whole("refractory", self.refractory, low=0, high=MAX_BINS)
         real("theta", self.theta, above=0.0)
 
     @property
     def threshold(self) -> float:
         return self.theta
+
+    @property
+    def reads_V(self) -> bool:
+        return True
 
     def parameters(self) -> tuple[float, ...]:
         return (self.alpha, self.theta, float(self.refractory))

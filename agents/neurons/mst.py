@@ -52,7 +52,10 @@ def step(
 
 @dataclass(frozen=True)
 class MST(Neuron):
-    """Multi-spike tempotron. Raises ValueError unless 0 < tau_s < tau_m and theta > 0.
+    """Multi-spike tempotron.
+
+    Raises ValueError unless 0 < tau_s < tau_m and theta > 0, and the two time constants can be told
+    apart within the precision of float64.
 
     Attributes:
         tau_m: τ_m, membrane time constant in bins.
@@ -79,16 +82,26 @@ class MST(Neuron):
                 f"tau_s must be smaller than tau_m = {self.tau_m:g}, got {self.tau_s:g}: "
                 "the response to a spike rises with tau_s and falls with tau_m"
             )
+        slow, fast, scale, _ = self.psp_kernel()
+        if not (math.isfinite(scale) and scale > 0.0 and fast < slow):
+            raise ValueError(
+                f"tau_m = {self.tau_m:g} and tau_s = {self.tau_s:g} must leave a response to a "
+                "spike, and in float64 they leave none: choose them nearer to 20 and 5 bins"
+            )
 
     @property
     def threshold(self) -> float:
         return self.theta
 
     @property
+    def reads_V(self) -> bool:
+        return True
+
+    @property
     def v_norm(self) -> float:
         """V_norm = k^(k/(k−1)) / (k−1) with k = τ_m/τ_s."""
         k = self.tau_m / self.tau_s
-        return float(k ** (k / (k - 1.0)) / (k - 1.0))
+        return float(k ** (k / (k - 1.0)) / (k - 1.0)) if 1.0 < k < math.inf else math.nan
 
     def parameters(self) -> tuple[float, ...]:
         kernel = self.psp_kernel()

@@ -17,6 +17,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from agents.model import Arrays, Model, PSPKernel, Response, threshold_name
 from agents.portable import portable
 from agents.simd import like, load
@@ -32,7 +34,8 @@ def input_current(weights: Any, channels: Any, first: int, last: int, zero: Any)
     """I(t) = Σ_i w_i s_i(t), summed from 0 over the ascending channels[first:last]."""
     current = zero
     for e in range(first, last):
-        current = current + load(weights, channels[e], zero)
+        # Unsigned: signed indices count from the end as well, and numba pays for looking.
+        current = current + load(weights, channels[np.uint64(e)], zero)
     return current
 
 

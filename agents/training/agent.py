@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-import numbers
+import copy
 import os
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -26,7 +25,7 @@ from agents.training.stepwise import Heard
 from agents.training.streams import WRONG_BEYOND
 from agents.training.told import Told, segments_told, whole_trial
 from agents.training.trial import ModelBlock, RuleBlock
-from gnm_env.checks import real, whole
+from gnm_env.checks import real, shown, whole
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial
 
@@ -76,15 +75,19 @@ class Agent:
                 f"{self._n_inputs:,} inputs: lower n_inputs, or hidden of a network"
             )
         self._weight_bounds = _checked_bounds(weight_bounds)
+        _require_numbers(model)
         rule.kernel(model)  # refuses a model that the rule cannot teach
         rule.static(self._n_inputs)
         if initial_weight is None:
             initial_weight = model.default_initial_weight
         scale = real("initial_weight", initial_weight, low=-1e100, high=1e100)
-        rng = np.random.default_rng((whole("seed", seed, low=0, high=2**128 - 1), 2))
+        seed = whole("seed", seed, low=0, high=2**128 - 1)
+        rng = np.random.default_rng((seed, 2))
         drawn = model.initial_weights(rng, self._n_inputs, scale)
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
+        self._rule_memory = np.zeros(len(rule.memory_type._fields))
+        self.rng = np.random.default_rng((seed, 3)) if rule.explore else None
         self._trials = 0
         self.overflowed = False
         self._prepare()
@@ -104,18 +107,41 @@ class Agent:
             np.array(self.rule_parameters(), np.float64)[:, None],
             self._velocity[:, None],
             rule.static(self._n_inputs),
+            self._rule_memory[:, None],
         )
         self._heard: Heard | None = None
         self._make_room(256, 4 * self._n_inputs + 256)
         self.begin_trial()
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("_model", "_rule", "_n_inputs", "_weight_bounds", "_weights", "_velocity")
-        return {name: getattr(self, name) for name in (*kept, "_trials", "overflowed")}
+        kept = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
+        return {**kept, "heard so far": self._heard_so_far()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        state = dict(state)
+        so_far = state.pop("heard so far", None)
         self.__dict__.update(state)
         self._prepare()
+        if so_far is not None:
+            self._go_on(*so_far)
+
+    def _heard_so_far(self) -> tuple[Any, ...]:
+        """The present trial: bins heard, state, memory, and the used part of each buffer."""
+        assert self._heard is not None
+        bins, events = self._bin, self._heard.offsets[self._bin]
+        used = (events, bins + 1, bins, bins, bins, bins, bins * self._model.n_notes)
+        pairs: Any = zip(self._heard, used, strict=True)
+        parts = [buffer[:n].copy() for buffer, n in pairs]
+        return bins, self._state.copy(), self._block.arrays.memory.copy(), parts
+
+    def _go_on(self, bins: int, state: Any, memory: Any, parts: Any) -> None:
+        """Take up a trial where `_heard_so_far` left it."""
+        self._make_room(max(bins, 256), len(parts[0]) + 4 * self._n_inputs + 256)
+        assert self._heard is not None
+        self._bin, self._state[:], self._block.arrays.memory[:] = bins, state, memory
+        pairs: Any = zip(self._heard, parts, strict=True)
+        for place, part in pairs:
+            place[: len(part)] = part
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self._model!r}, {self._rule!r}, n_inputs={self._n_inputs})"
@@ -166,6 +192,24 @@ class Agent:
         put("velocity", values, self._velocity)
 
     @property
+    def momentum(self) -> NDArray[np.float64]:
+        """The former name of `velocity`. (The factor μ is the rule's: `agent.rule.momentum`.)"""
+        return self._velocity
+
+    @momentum.setter
+    def momentum(self, values: ArrayLike) -> None:
+        self.velocity = values
+
+    @property
+    def rule_memory(self) -> NDArray[np.float64]:
+        """float64, what the rule remembers from trial to trial; assigning copies, checked."""
+        return self._rule_memory
+
+    @rule_memory.setter
+    def rule_memory(self, values: ArrayLike) -> None:
+        put("rule_memory", values, self._rule_memory)
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest weight; infinite where there is no bound."""
         return self._weight_bounds or (-np.inf, np.inf)
@@ -195,8 +239,9 @@ class Agent:
     # --- the standard loop -----------------------------------------------------------------------
 
     def begin_trial(self) -> None:
-        """Forget the last trial: state 0, empty record. Checks that the weights are finite."""
+        """Forget the last trial: state 0, empty record. Checks that what learns is finite."""
         require_finite("weights", self._weights)
+        require_finite("velocity", self._velocity)
         assert self._heard is not None
         self._state[:] = 0.0
         self._block.arrays.memory[:] = 0.0
@@ -217,6 +262,10 @@ class Agent:
         if out < 0.0:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
             out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+        if self.rng is not None:
+            V = self._heard.V[self._bin, 0]
+            out = self._loops.explore_bin(self._rule_block, self._block, V, self.rng.random())
+            self._heard.output[self._bin] = out
         self._bin += 1
         return out
 
@@ -224,8 +273,8 @@ class Agent:
         """Learn from the trial that has just ended.
 
         `reward` is that of the last step and `info` its terminal info. With `sign_only` (the
-        environment gives feedback="sign") only the reward is used. A weight that would overflow
-        ends learning: `overflowed` is set, the last weights are kept.
+        environment gives feedback="sign") only the reward is used. A weight that would overflow,
+        or a potential that has, ends learning: `overflowed` is set, the last weights are kept.
 
         Raises:
             ValueError: if reward or info are no numbers, do not agree with what was heard, or do
@@ -233,9 +282,12 @@ class Agent:
         """
         told = self._told(reward, info, sign_only)
         self._trials += 1
+        assert self._heard is not None
+        # What is not finite stays so: the last bin tells for all.
+        if not np.isfinite(self._heard.V[self._bin - 1, 0]):
+            self.overflowed = True
         if self.overflowed:
             return
-        assert self._heard is not None
         decay_trials = self._rule.decay_trials
         decay = 0.0 if decay_trials is None else 1.0 / decay_trials
         left = 1.0 - float(self._trials - 1) * decay
@@ -252,35 +304,53 @@ class Agent:
     def _told(self, reward: float, info: Mapping[str, Any], sign_only: bool) -> Told:
         """What the rule may know, checked."""
         feedback = self._rule.feedback
-        if not isinstance(reward, numbers.Real) or not math.isfinite(reward):
-            raise ValueError(f"reward must be a finite number, got {reward!r}")
-        if sign_only and feedback == "sign":
-            return whole_trial(self._bin, told=float(np.sign(reward)))
-        assert self._heard is not None
-        given = float(self._heard.output[: self._bin].sum())
-        if "emitted" in info and abs(float(info["emitted"]) - given) > 1e-6 * max(1.0, given):
+        reward = real("reward", reward)
+        if self._bin == 0:
             raise ValueError(
-                f"the environment counted {info['emitted']} of output and the agent gave {given:g} "
-                f"in {self._bin} bins: an agent must hear and answer every bin of a trial, so "
-                "wrappers that skip bins or change actions cannot be used"
+                "a trial must be heard before it can be learned from, and no bin was: "
+                "call act(obs) for each bin, and then learn"
             )
-        if feedback == "reward":
-            return whole_trial(self._bin, told=float(reward) - 1.0)
+        if not sign_only:
+            self._require_agreement(info)
+        elif feedback == "sign":
+            return whole_trial(self._bin, told=float(np.sign(reward)))
         if feedback == "none":
             return whole_trial(self._bin, told=1.0)
+        if feedback == "reward" and not sign_only:
+            return whole_trial(self._bin, told=float(reward) - 1.0)
         if sign_only:
             raise ValueError(
                 f"{type(self._rule).__name__} needs to know {FEEDBACK[feedback]}, and this "
                 'environment tells the sign of the error only: use feedback="cost", or a rule '
                 "such as AggregateLabel or CriticalThreshold"
             )
-        return segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        told = segments_told(self._bin, info, feedback == "presentations", type(self._rule))
+        self._rule.check_label(told.label)
+        return told
+
+    def _require_agreement(self, info: Any) -> None:
+        """ValueError if the terminal `info` contradicts what was heard and answered."""
+        if not isinstance(info, Mapping):
+            raise ValueError(
+                f"info must be the terminal info of the trial, a dict, got {shown(info)}; "
+                "hand on what env.step returned last"
+            )
+        assert self._heard is not None
+        given = float(self._heard.output[: self._bin].sum())
+        emitted = real("emitted", info["emitted"], finite=False) if "emitted" in info else given
+        if abs(emitted - given) > 1e-6 * max(1.0, given):
+            raise ValueError(
+                f"the environment counted {emitted:g} of output and the agent gave {given:g} "
+                f"in {self._bin} bins: an agent must hear and answer every bin of a trial, so "
+                "wrappers that skip bins or change actions cannot be used"
+            )
 
     def _make_room(self, bins: int, events: int) -> None:
         """Buffers for at least `bins` bins and `events` input spikes; what they hold is kept."""
         long = Heard(
             np.empty(events, np.int32),
             np.zeros(bins + 1, np.int64),
+            np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
             np.empty((bins, 1)),
@@ -315,19 +385,13 @@ class Agent:
         self, observation: Any, state: Any, episode_start: Any
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Outputs (n,) of n streams for one bin, and their states."""
-        obs = np.asarray(observation)
+        obs = _array(observation)
         obs = obs[None] if obs.ndim == 1 else obs
         rows = self._checked(obs, (*obs.shape[:1], self._n_inputs))
         shape = (len(rows), self._n_state + self._model.n_memory, 1)
         states = np.zeros(shape) if state is None else _checked_state(state, shape)
         if episode_start is not None:
-            begins = np.atleast_1d(np.asarray(episode_start, np.bool_))
-            if begins.shape != (len(rows),):
-                raise ValueError(
-                    f"episode_start must have shape ({len(rows)},), one per stream, "
-                    f"got {begins.shape}"
-                )
-            states[begins] = 0.0
+            states[checked_begins(episode_start, len(rows))] = 0.0
         require_finite("weights", self._weights)
         return self._loops.predict(self._block, self._n_state, states, rows), states
 
@@ -369,7 +433,7 @@ class Agent:
         _, advance = model.advance()
         biexponential = rule.kernel(model).biexponential
         return (
-            type(self), advance, model.static(self._n_inputs), type(rule),
+            type(self), advance, model.static(self._n_inputs), type(rule), rule.variant,
             rule.static(self._n_inputs), biexponential, self._n_inputs,
         )  # fmt: skip
 
@@ -379,11 +443,17 @@ class Agent:
         return AgentBatch(agents, source)
 
     def _take(
-        self, weights: NDArray[np.float64], velocity: NDArray[np.float64], trials: int, over: bool
+        self,
+        weights: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        rule_memory: NDArray[np.float64],
+        trials: int,
+        over: bool,
     ) -> None:
         """What training side by side has made of it."""
         self._weights[:] = weights
         self._velocity[:] = velocity
+        self._rule_memory[:] = rule_memory
         self._trials, self.overflowed = trials, over
 
     # --- checkpoints -----------------------------------------------------------------------------
@@ -413,17 +483,33 @@ class Agent:
         return cls(model, rule, n_inputs, weight_bounds=weight_bounds)  # type: ignore[call-arg]
 
     def replaced(self, **changes: Any) -> Self:
-        """A copy with other parameters of its model, such as alpha=0.2; the weights are kept."""
+        """A copy with other parameters of its model, such as alpha=0.2; the weights are kept.
+
+        Raises ValueError for a parameter that the model does not have, or out of range.
+        """
+        known = [field.name for field in fields(self._model) if field.init]  # type: ignore[arg-type]
+        unknown = sorted(set(changes) - set(known))
+        if unknown:
+            raise ValueError(
+                f"a {type(self._model).__name__} has the parameters {', '.join(known)}, "
+                f"got {unknown[0]!r}"
+            )
         model = replace(self._model, **changes)  # type: ignore[type-var]
         agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
         agent.weights, agent.velocity = self._weights, self._velocity
+        agent.rule_memory = self._rule_memory
+        agent.rng = copy.deepcopy(self.rng)
         agent._trials = self._trials
         return agent
 
 
+_DERIVED = {"_loops", "_n_state", "_state", "_block", "_rule_block", "_heard", "_bin"}
+"""Attributes that `_prepare` makes of the others."""
+
+
 def put(name: str, values: ArrayLike, place: NDArray[np.float64]) -> None:
     """Copy `values`, one for each or one for all, into `place`; ValueError if they do not fit."""
-    array = np.asarray(values)
+    array = _array(values)
     if array.dtype.kind not in "fiub":
         raise ValueError(f"{name} must be real numbers, got {array.dtype} values")
     if array.shape not in ((), place.shape):
@@ -443,9 +529,42 @@ def require_finite(name: str, values: NDArray[np.float64]) -> None:
         )
 
 
+def _array(values: Any) -> NDArray[Any]:
+    """`values` as an array; rows of unequal length as one of objects, which no check lets pass."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        return np.empty(1, object)
+
+
+def checked_begins(episode_start: Any, n: int) -> NDArray[np.bool_]:
+    """Where streams begin anew, (n,); ValueError unless it says so, True or False, for each."""
+    begins = np.atleast_1d(_array(episode_start))
+    if begins.dtype.kind not in "biuf" or not np.isin(begins, (0, 1)).all():
+        raise ValueError(
+            f"episode_start must be True or False for each stream, got {shown(episode_start)}"
+        )
+    if begins.shape != (n,):
+        raise ValueError(
+            f"episode_start must have shape ({n},), one per stream, got {begins.shape}"
+        )
+    return begins.astype(np.bool_)
+
+
+def _require_numbers(model: Model) -> None:
+    """ValueError if what compiled code takes of the model's parameters is no number."""
+    derived = dict(zip(model.parameters_type._fields, model.parameters(), strict=False))  # type: ignore[attr-defined]
+    bad = [name for name, value in derived.items() if np.isnan(value)]
+    if bad:
+        raise ValueError(
+            f"the parameters of {model!r} must give finite numbers, and {bad[0]} is none: "
+            "choose values nearer to their defaults"
+        )
+
+
 def _bits(obs: Any) -> NDArray[np.int8]:
     """Observations of another type as int8; ValueError unless they are 0 and 1."""
-    array = np.asarray(obs)
+    array = _array(obs)
     if array.dtype.kind not in "fiub" or not np.isin(array, (0, 1)).all():
         raise ValueError(
             "an observation must hold the bits of a bin, 0 and 1, as the environments give them; "
@@ -460,11 +579,16 @@ def _checked_state(state: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
         raise ValueError(
             f"state must be what predict returned, or None, got {type(state).__name__}"
         )
-    states = np.asarray(state[0])
+    states = _array(state[0])
     if states.dtype != np.float64 or states.shape != shape:
         raise ValueError(
             f"state must be what predict returned for as many streams, float64 of shape {shape}, "
             f"got {states.dtype} of shape {states.shape}"
+        )
+    if np.isnan(states).any():
+        raise ValueError(
+            "state must hold numbers, got NaN: it is not what predict returned, or a potential "
+            "has overflowed; begin anew with None, or lower the weights"
         )
     return np.array(states, order="C")
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from agents.training.binding import loops
 from agents.training.compile_errors import explained
+from agents.training.exploration import put_state, state_of
 from agents.training.source import Source
 from agents.training.streams import MOST_SPIKES, Learning, Models, Tally
 
@@ -91,13 +92,15 @@ class AgentBatch:
             self._blocks([agent.velocity for agent in self._agents]),
             overflow,
             self._blocks([[float(agent.trials)] for agent in self._agents]),
+            self._blocks([agent.rule_memory for agent in self._agents]),
+            self._blocks([state_of(agent.rng) for agent in self._agents], np.uint64),
             first.rule.static(first.n_inputs),
         )
         self._trials = 0
 
-    def _blocks(self, rows: Rows) -> NDArray[np.float64]:
+    def _blocks(self, rows: Rows, dtype: type = np.float64) -> NDArray[Any]:
         """One row per agent -> (blocks, columns, width), the last agent repeated to fill up."""
-        table = np.array(rows, np.float64)
+        table: NDArray[Any] = np.array(rows, dtype)
         padding = -len(table) % self._width
         table = np.concatenate([table, np.repeat(table[-1:], padding, axis=0)])
         blocks = table.reshape(-1, self._width, table.shape[1])
@@ -160,12 +163,16 @@ class AgentBatch:
         """Put what was learned into the agents."""
         weights = self._rows(self._models.weights)
         velocity = self._rows(self._learning.velocity)
+        memory = self._rows(self._learning.memory)
+        generators = self._rows(self._learning.generators)
         overflowed = self.overflowed()
         for k, agent in enumerate(self._agents):
             heard = int(self._per_agent(self._learning.heard)[k]) + self._trials
-            agent._take(weights[k], velocity[k], heard, bool(overflowed[k] >= 0))
+            if agent.rng is not None:
+                put_state(agent.rng, generators[k])
+            agent._take(weights[k], velocity[k], memory[k], heard, bool(overflowed[k] >= 0))
 
-    def _rows(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _rows(self, blocks: NDArray[Any]) -> NDArray[Any]:
         """(blocks, rows, width) -> one row per agent."""
         return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: len(self._agents)]
 

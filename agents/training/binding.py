@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
-from agents.learning.rule import CORRECTIONS, Rule
-from agents.learning.teaching import replay_template
+from agents.learning.rule import CORRECTIONS, Rule, always
+from agents.learning.teaching import accumulate_template, replay_template
 from agents.model import Model, threshold_name
 from agents.training import change
+from agents.training.exploration import explore_bin_template, explore_trial_template
 from agents.training.slots import LEARN_WIDTH
 from agents.training.stepwise import (
     predict_template,
@@ -17,7 +18,12 @@ from agents.training.stepwise import (
     step_template,
     update_template,
 )
-from agents.training.streams import answer_template, survive_template, train_template
+from agents.training.streams import (
+    answer_template,
+    new_log_template,
+    survive_template,
+    train_template,
+)
 from agents.training.trial import (
     amount_of,
     gives_any,
@@ -26,6 +32,7 @@ from agents.training.trial import (
     run_bins_template,
     run_trial_template,
     spikes_of,
+    weighed_template,
 )
 from gnm_env.compiled import specialise
 
@@ -36,8 +43,36 @@ def loops(model: Model, rule: Rule, width: int = 1) -> Any:
     Compiled at their first call and kept on disk.
     """
     label, advance = model.advance()
-    kernel = rule.kernel(model)
-    return _loops(label, advance, type(model), type(rule), kernel.biexponential, width)
+    return _loops(
+        Key(
+            label, advance, type(model), model.reads_V, model.readout_lag,
+            type(rule), rule.variant, rule.kernel(model).biexponential, width,
+        )
+    )  # fmt: skip
+
+
+class Key(NamedTuple):
+    """What compiled loops differ in."""
+
+    label: str
+    advance: Any
+    model: type[Model]
+    reads_V: bool
+    lag: int
+    rule: type[Rule]
+    variant: tuple[str, bool]
+    biexponential: bool
+    width: int
+
+    @property
+    def taught(self) -> str:
+        """A name for the model and what it learns by, whatever the width."""
+        parts = [self.label, self.rule.name, "bi" if self.biexponential else "mono"]
+        if self.variant != (self.rule.feedback, self.rule.learns_when_right):
+            parts.append("_".join(map(str, self.variant)))
+        if not self.reads_V:
+            parts.append(f"x{self.lag}")
+        return "_".join(parts)
 
 
 def recorder(model: Model) -> Any:
@@ -52,22 +87,32 @@ def _recorder(label: str, advance: Any, model: type[Model]) -> Any:
 
 
 @functools.cache
-def _loops(
-    label: str, advance: Any, model: type[Model], rule: type[Rule], biexponential: bool, width: int
-) -> Any:
-    of_model = _of_model(advance, model, width)
-    of_rule = _of_rule(rule, biexponential, width)
-    alone = f"{label}_{width}"
-    together = f"{label}_{rule.name}_{'bi' if biexponential else 'mono'}_{width}"
-    flags = {name: of_rule[name] for name in ("USES_ERROR", "USES_OUTPUT")}
+def _loops(key: Key) -> Any:
+    of_model = _of_model(key.advance, key.model, key.width)
+    of_rule = _of_rule(key)
+    alone = f"{key.label}_{key.width}"
+    together = f"{key.taught}_{key.width}"
+    flags = {name: of_rule[name] for name in ("USES_ERROR", "USES_OUTPUT", "USES_READOUT")}
     bins = specialise(run_bins_template, together, inline=True, **of_model, **flags)
-    trial = specialise(run_trial_template, together, inline=True, **of_model, run_bins=bins)
-    compute_change = _change(label, of_model, of_rule, rule, together)
+    trial = specialise(
+        run_trial_template, together, inline=True, **of_model, **flags, run_bins=bins
+    )
+    compute_change = _change(key, of_model, of_rule, together)
     learn = specialise(
         learn_trial_template, together, inline=True, **of_rule, compute_change=compute_change
     )
     everything = {**of_model, **of_rule, "run_trial": trial, "learn_trial": learn}
-    return SimpleNamespace(
+    everything["new_log"] = specialise(new_log_template, together, inline=True, **of_rule)
+    if key.rule.weigh is not None:
+        everything["weighed"] = specialise(weighed_template, together, **of_rule)
+    made = SimpleNamespace()
+    if key.rule.explore is not None:
+        names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
+        everything["explore_trial"] = specialise(
+            explore_trial_template, together, inline=True, **names
+        )
+        made.explore_bin = specialise(explore_bin_template, together, **names)
+    made.__dict__.update(
         train=specialise(train_template, together, **everything),
         answer=specialise(answer_template, together, **everything),
         update=specialise(update_template, together, **everything),
@@ -75,6 +120,7 @@ def _loops(
         step=specialise(step_template, alone, **of_model),
         predict=specialise(predict_template, alone, **of_model),
     )
+    return made
 
 
 def _of_model(advance: Any, model: type[Model], width: int) -> dict[str, Any]:
@@ -88,36 +134,66 @@ def _of_model(advance: Any, model: type[Model], width: int) -> dict[str, Any]:
     }
 
 
-def _of_rule(rule: type[Rule], biexponential: bool, width: int) -> dict[str, Any]:
+def _of_rule(key: Key) -> dict[str, Any]:
+    rule, (feedback, learns_when_right) = key.rule, key.variant
+    whole_trial = rule.teach is not None or rule.change is not None
+    needs_readout = whole_trial or rule.bin_signal is not None
     return {
-        "WIDTH": width,
-        "LEARN_WIDTH": min(width, LEARN_WIDTH),
-        "USES_ERROR": rule.uses_error,
-        "USES_OUTPUT": rule.teach is not None or rule.change is not None,
-        "BIEXPONENTIAL": biexponential,
-        "SEES_PRESENTATIONS": rule.feedback == "presentations",
-        "correction": CORRECTIONS[rule.feedback],
+        "WIDTH": key.width,
+        "LEARN_WIDTH": min(key.width, LEARN_WIDTH),
+        "USES_ERROR": rule.uses_error and feedback == "presentations",
+        "USES_OUTPUT": whole_trial or rule.uses_output,
+        "USES_READOUT": needs_readout and not key.reads_V,
+        "READS_V": key.reads_V or not needs_readout,
+        "LAG": key.lag if needs_readout else 0,
+        "BIEXPONENTIAL": key.biexponential,
+        "SEES_PRESENTATIONS": feedback == "presentations",
+        "TOLD_REWARD": feedback == "reward",
+        "WEIGHS": rule.weigh is not None,
+        "EXPLORES": rule.explore is not None,
+        "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
+        "OwnNumbers": rule.parameters_type,
+        "Memory": rule.memory_type,
+        "correction": always if learns_when_right else CORRECTIONS[feedback],
+        **rule.compiled_parts(),
     }
 
 
-def _change(
-    label: str, of_model: dict[str, Any], of_rule: dict[str, Any], rule: type[Rule], together: str
-) -> Any:
+def _change(key: Key, of_model: dict[str, Any], of_rule: dict[str, Any], together: str) -> Any:
     """The compiled function that computes Δw before momentum and bounds."""
+    rule = key.rule
+    names = {**of_rule}
+    if rule.bin_signal is not None or rule.teaching_signal is None:
+        names["THRESHOLD"] = _threshold_row(of_model)
     if rule.block_change is not None:
         return specialise(rule.block_change, together, **of_rule)
-    if rule.teaching_signal is not None:
-        names = {**of_rule, **rule.compiled_pointwise()}
+    if rule.side_by_side is not None:
+        sums = specialise(change.side_by_side_template, together, inline=True, **names)
+        names["sum_eligibility"] = sums
+        return specialise(change.pointwise_change_template, together, inline=True, **names)
+    if rule.bin_signal is not None or rule.teaching_signal is not None:
+        signal = specialise(change.bin_signal_template, together, inline=True, **names)
+        names["bin_signal"] = signal
         sums = specialise(change.sum_eligibility_template, together, inline=True, **names)
-        return specialise(
-            change.pointwise_change_template, together, inline=True, **names, sum_eligibility=sums
-        )
-    numbers = of_model["Parameters"]
-    names = {**of_model, **of_rule, "WIDTH": 1, "OwnNumbers": rule.parameters_type}
-    names["THRESHOLD"] = numbers._fields.index(threshold_name(numbers))
-    alone = together.rpartition("_")[0]
-    replay = specialise(replay_template, label, **names)
-    own = specialise(rule.teach or rule.change, f"{alone}_own", replay=replay)
-    epsilon = specialise(change.epsilon_template, alone, **names, teach=own) if rule.teach else own
-    learn_alone = specialise(change.learn_alone_template, alone, **names, epsilon=epsilon)
-    return specialise(change.taught_change_template, together, **of_rule, learn_alone=learn_alone)
+        names["sum_eligibility"] = sums
+        return specialise(change.pointwise_change_template, together, inline=True, **names)
+    names |= {**of_model, "WIDTH": 1}
+    kernel = "bi" if key.biexponential else "mono"
+    replay = specialise(replay_template, key.label, **names)
+    accumulate = specialise(accumulate_template, kernel, **names)
+    calls = {"replay": replay, "accumulate": accumulate}
+    own = specialise(rule.teach or rule.change, f"{key.taught}_own", **calls)
+    epsilon = own
+    if rule.teach is not None:
+        names |= {"teach": own, "accumulate": accumulate}
+        epsilon = specialise(change.epsilon_template, key.taught, **names)
+    names["epsilon"] = epsilon
+    learn_alone = specialise(change.learn_alone_template, key.taught, **names)
+    names = {**of_rule, "THRESHOLD": names["THRESHOLD"], "learn_alone": learn_alone}
+    return specialise(change.taught_change_template, together, **names)
+
+
+def _threshold_row(of_model: dict[str, Any]) -> int:
+    parameters = of_model["Parameters"]
+    row: int = parameters._fields.index(threshold_name(parameters))
+    return row

@@ -9,12 +9,18 @@ import gymnasium as gym
 import numpy as np
 from numpy.random import Generator
 
-from agents.history import BLOCK, Callback, History
-from gnm_env.checks import whole
+from agents.history import BLOCK, Callback, History, checked_callback
+from gnm_env.checks import shown, whole
+
+MAX_TRIALS = 10**12
+"""Most trials of one call."""
 
 
 class WeightOverflow(RuntimeWarning):
-    """A weight would have overflowed: learning ended, the last finite weights are kept."""
+    """A weight would have overflowed, or the potential has: learning ended.
+
+    The last finite weights are kept.
+    """
 
 
 def train(
@@ -29,11 +35,12 @@ def train(
     """Train `agent` on `trials` episodes of `env`, a PatternTrial environment, wrapped or not.
 
     Args:
-        agent: offers begin_trial(), act(obs) and learn(reward, info, sign_only). If it has an
-            attribute `overflowed`, training ends once that is True; answers within its
-            `wrong_beyond` of the label, if it has one, count as right.
+        agent: offers begin_trial(), act(obs) and learn(reward, info, sign_only). Spikes and amounts
+            do not mix: a spiking agent needs an environment of spikes. If it has an attribute
+            `overflowed`, training ends once that is True; answers within its `wrong_beyond` of the
+            label, if it has one, count as right.
         env: gives the aggregate label in its terminal info, or its sign as reward.
-        trials: number of episodes.
+        trials: number of episodes, at most MAX_TRIALS.
         seed: of the stream. A Generator goes on from where it stands (and is moved on); None goes
             on with the environment's own.
         callback: called after each block with the trials done and the history; False ends training.
@@ -43,9 +50,14 @@ def train(
         The learning curve. Ends with the same bits as `train_many` on the same seed.
 
     Raises:
-        ValueError: if a number is out of range, or if `env` ends a trial without its label.
+        ValueError: if a number is out of range, if `agent` does not learn in `env`, or if `env`
+            ends a trial without its label.
     """
-    trials, block = whole("trials", trials, low=0), whole("block", block, low=1)
+    trials = whole("trials", trials, low=0, high=MAX_TRIALS)
+    block = whole("block", block, low=1, high=MAX_TRIALS)
+    callback = checked_callback(callback)
+    _require_learner(agent)
+    _require_env(env, agent)
     sign_only = getattr(env.unwrapped, "feedback", None) == "sign"
     if isinstance(seed, Generator):
         env.unwrapped.np_random = seed
@@ -66,7 +78,7 @@ def train(
             while not ended:
                 obs, reward, terminated, truncated, info = env.step(agent.act(obs))
                 ended = terminated or truncated
-            if "label" not in info:
+            if "label" not in info or "emitted" not in info:
                 raise ValueError(
                     "env must tell the aggregate label at the end of each trial, as "
                     f"gnm/PatternTrial-v0 does, got info {info} from {env}; "
@@ -88,11 +100,43 @@ def train(
     return history
 
 
+def _require_learner(agent: Any) -> None:
+    missing = [
+        name for name in ("begin_trial", "act", "learn") if not callable(getattr(agent, name, None))
+    ]
+    if missing or isinstance(agent, type):
+        lacks = f", which has no {missing[0]}()" if missing else ""
+        raise ValueError(
+            "agent must be one agent with begin_trial(), act(obs) and learn(reward, info, "
+            f"sign_only), such as NeuronAgent makes, got {shown(agent)}{lacks}"
+        )
+
+
+def _require_env(env: Any, agent: Any) -> None:
+    lacking = not all(hasattr(env, name) for name in ("reset", "step", "unwrapped"))
+    if lacking or isinstance(env, (type, gym.vector.VectorEnv)):
+        raise ValueError(
+            f"env must be a gymnasium Env, got {shown(env)}; "
+            'make one with gymnasium.make("gnm/PatternTrial-v0"), or use train_many'
+        )
+    graded = getattr(getattr(agent, "model", None), "graded", None)
+    actions = getattr(env, "action_space", None)
+    if graded is None or actions is None:
+        return  # an agent or an environment of another make
+    if graded == isinstance(actions, gym.spaces.Discrete):
+        given, output = ("amounts", "graded") if graded else ("spikes", "spikes")
+        raise ValueError(
+            f"the {type(agent).__name__} answers with {given}, and the environment takes "
+            f'{actions}: make it with output="{output}"'
+        )
+
+
 def warn_of_overflow(who: str, trials: int) -> None:
     """Warn, with a remedy, that learning has ended; as if from where training was called."""
     warnings.warn(
-        f"a weight of {who} would have overflowed within {trials:,} trials: learning ended and the "
-        "last finite weights are kept; lower learning_rate or set weight_bounds",
+        f"a weight or a potential of {who} would have overflowed within {trials:,} trials: "
+        "learning ended and the last finite weights are kept; lower learning_rate or "
+        "initial_weight, or set weight_bounds",
         WeightOverflow,
         stacklevel=3,
     )

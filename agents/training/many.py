@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from agents.history import BLOCK, Callback, History
+from agents.history import BLOCK, Callback, History, checked_callback
 from agents.memory import require_memory
 from agents.model import Model
 from agents.training.batch import AgentBatch
-from agents.training.loop import warn_of_overflow
+from agents.training.loop import MAX_TRIALS, warn_of_overflow
 from agents.training.source import Source, source_of
 from gnm_env.checks import whole
 from gnm_env.task import Patterns, Task
@@ -31,9 +31,6 @@ SHARES, BLOCKS_PER_SHARE = 3, 8
 With several, a thread that the machine holds up leaves work to the others. Every unit draws the
 trials for itself, which eight blocks make cheap.
 """
-
-MAX_TRIALS = 10**12
-"""Most trials of one call."""
 
 Unit = tuple[AgentBatch, list[int]]
 """Agents that one thread trains side by side, and their places in the user's list."""
@@ -81,6 +78,7 @@ def train_many(
         raise ValueError("trials must say how many trials to train on, such as trials=60_000")
     trials = whole("trials", trials, low=0, high=MAX_TRIALS)
     block = whole("block", block, low=1, high=MAX_TRIALS)
+    callback = checked_callback(callback)
     rng = generator_from(seed)
     threads = thread_count(threads)
     source = source_of(task, patterns)

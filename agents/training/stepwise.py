@@ -11,6 +11,9 @@ from agents.learning.rule import Outcome
 from agents.model import Arrays, Block
 from agents.simd import full, pack, repeated, store, unpack, where
 from agents.training.slots import (
+    TOLD_REWARD,
+    USES_ERROR,
+    WEIGHS,
     WIDTH,
     Parameters,
     State,
@@ -19,6 +22,7 @@ from agents.training.slots import (
     correction,
     learn_trial,
     output,
+    weighed,
 )
 from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
 from gnm_env.segments import TrialArrays
@@ -32,6 +36,7 @@ class Heard(NamedTuple):
     V: Block
     above: Block
     output: Block
+    readout: Block
     notes: Block
 
 
@@ -89,6 +94,7 @@ def step_template(
     store(heard.V, t, response.V)
     store(heard.above, t, where(active(response), 1.0, zero))
     store(heard.output, t, out)
+    store(heard.readout, t, response.X)
     return out
 
 
@@ -108,7 +114,7 @@ def update_template(
     overflow, 0 if the trial taught nothing, else 1.
     """
     counts = np.empty((len(trial.target), WIDTH))
-    log = TrialLog(heard.V, heard.above, heard.output, counts)
+    log = TrialLog(heard.V, heard.above, heard.output, heard.readout, counts)
     in_noise = 0.0
     in_presentations = 0.0
     blame = 0.0
@@ -121,7 +127,7 @@ def update_template(
         counts[segment, 0] = given
         if segment % 2 == 0:
             in_noise += given
-            blame += above
+            blame += above if USES_ERROR else given
         else:
             in_presentations += given
             blame += 0.0 if given == trial.target[segment] else 1.0
@@ -129,6 +135,8 @@ def update_template(
         c = correction(Outcome(in_noise + in_presentations, label, blame > 0.0))
     else:
         c = told
+    if WEIGHS and c != 0.0:
+        c = weighed(rule, c + 1.0 if TOLD_REWARD else c, True)
     if c == 0.0:
         return 0
     scratch = new_scratch(len(model.arrays.weights), WIDTH)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -12,16 +12,22 @@ from agents.learning.rule import RuleParameters
 from agents.model import Arrays, Block
 from agents.simd import any_lane, full, load, pack, store, unpack, where
 from agents.training.slots import (
+    EXPLORES,
+    TOLD_REWARD,
     USES_ERROR,
     USES_OUTPUT,
+    USES_READOUT,
+    WEIGHS,
     WIDTH,
     Parameters,
     State,
     advance,
     correction,
+    explore_trial,
     learn_trial,
     output,
     run_trial,
+    weighed,
 )
 from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
 from gnm_env.batches import Batch, trial_of
@@ -62,6 +68,10 @@ class Learning(NamedTuple):
     """(blocks, 1, WIDTH); the trial in which a weight would have overflowed, or −1."""
     heard: Block
     """(blocks, 1, WIDTH); trials that each model had heard before."""
+    memory: Block
+    """(blocks, numbers, WIDTH); what the rule remembers from trial to trial."""
+    generators: NDArray[np.uint64]
+    """(blocks, 4, WIDTH); see `agents.training.exploration`."""
     static: tuple[int, ...]
 
 
@@ -70,6 +80,20 @@ def block_of(models: Models, block: int, memory: Block, notes: Block) -> ModelBl
     """Block `block` of the models."""
     arrays = Arrays(models.weights[block], memory, notes)
     return ModelBlock(models.parameters[block], arrays, models.static, models.n_notes)
+
+
+def new_log_template(bins: int, segments: int) -> TrialLog:
+    """Room for what trials of so many bins and segments leave for learning."""
+    return TrialLog(
+        np.empty((bins, WIDTH)),
+        np.empty((bins if USES_ERROR else 0, WIDTH)),
+        np.empty((bins if USES_OUTPUT else 0, WIDTH)),
+        np.empty((bins if USES_READOUT else 0, WIDTH)),
+        np.empty((segments, WIDTH)),
+    )
+
+
+new_log: Any = None  # bound to the template above
 
 
 def train_template(
@@ -91,17 +115,15 @@ def train_template(
     memory = np.zeros((models.n_memory, WIDTH))
     scratch = new_scratch(models.weights.shape[1], WIDTH)
     notes = np.empty((longest * models.n_notes, WIDTH))
-    log = TrialLog(
-        np.empty((longest, WIDTH)),
-        np.empty((longest if USES_ERROR else 0, WIDTH)),
-        np.empty((longest if USES_OUTPUT else 0, WIDTH)),
-        np.empty((batch.edges.size, WIDTH)),
-    )
+    log = new_log(longest, batch.edges.size)
     for block in range(len(models.weights)):
         p = unpack(Parameters, models.parameters[block], zero)
         # Out of the inner loop, where a view of an array costs as much as some bins.
         model = block_of(models, block, memory, notes)
-        rule = RuleBlock(learning.parameters[block], learning.velocity[block], learning.static)
+        rule = RuleBlock(
+            learning.parameters[block], learning.velocity[block], learning.static,
+            learning.memory[block],
+        )  # fmt: skip
         decay = unpack(RuleParameters, learning.parameters[block], zero).decay
         rate = unpack(RuleParameters, learning.parameters[block], zero).learning_rate
         heard = load(learning.heard[block], 0, zero) + float(first_trial)
@@ -111,11 +133,19 @@ def train_template(
         for k in range(drawn):
             trial = trial_of(batch, k)
             outcome, _ = run_trial(p, model, trial, log)
+            if EXPLORES:
+                outcome = explore_trial(rule, model, trial, log, learning.generators[block])
             error = outcome.label - outcome.emitted
             error = where(error < 0.0, zero - error, error)
             n_wrong = n_wrong + where(error > WRONG_BEYOND, 1.0, zero)
             total_error = total_error + error
+            # What is not finite stays so: the last bin tells for all.
+            V = load(log.V, trial.edges[len(trial.edges) - 1] - 1, zero)
+            diverged = (overflowed_in < 0.0) & (V * 0.0 != 0.0)
+            overflowed_in = where(diverged, float(first_trial + k), overflowed_in)
             c = where(overflowed_in < 0.0, correction(outcome), zero)
+            if WEIGHS and any_lane(c != 0.0):
+                c = weighed(rule, c + 1.0 if TOLD_REWARD else c, c != 0.0)
             if any_lane(c != 0.0):
                 store(scratch.corrections, 0, c)
                 left = 1.0 - (heard + float(k)) * decay
@@ -199,12 +229,7 @@ def answer_template(batch: Batch, drawn: int, longest: int, models: Models, tall
     """
     zero = full(0.0, WIDTH)
     memory = np.zeros((models.n_memory, WIDTH))
-    log = TrialLog(
-        np.empty((longest, WIDTH)),
-        np.empty((longest, WIDTH)),
-        np.empty((longest, WIDTH)),
-        np.empty((batch.edges.size, WIDTH)),
-    )
+    log = new_log(longest, batch.edges.size)
     notes = np.empty((longest * models.n_notes, WIDTH))
     noise_bins = 0
     for k in range(drawn):

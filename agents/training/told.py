@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.checks import MAX_BINS, MAX_LABEL, MAX_TARGET, shown, whole, whole_array
 from gnm_env.segments import TrialArrays, fill_segments
 
 
@@ -36,22 +36,47 @@ def whole_trial(n_bins: int, told: float, label: float = 0.0) -> Told:
 def segments_told(n_bins: int, info: Mapping[str, Any], presentations: bool, rule: type) -> Told:
     """What the terminal `info` of a trial of `n_bins` bins tells; ValueError if it cannot be.
 
-    With `presentations` their onsets, ends and targets are needed, else the label alone.
+    With `presentations` their onsets, ends and targets are needed, else the label alone: it may
+    then be any that a user wants, below 0 too; presentations that are there must still be possible.
     """
-    label = _whole("label", _needed(info, "label", rule))
-    if not presentations:
-        return whole_trial(n_bins, float("nan"), float(label))
-    if info.get("label_only", False):
+    least = 0 if presentations else -MAX_LABEL
+    label = whole("label", _needed(info, "label", rule), low=least, high=MAX_LABEL)
+    if presentations and info.get("label_only", False):
         raise ValueError(
             f"{rule.__name__} needs to know where the presentations were, and of this trial only "
             "the label is known: use a rule such as AggregateLabel or CriticalThreshold"
         )
-    onsets = _row("onsets", _needed(info, "onsets", rule))
-    owed = _row("targets", _needed(info, "targets", rule))
+    if presentations:
+        for key in ("onsets", "targets") + (() if "ends" in info else ("pattern_bins",)):
+            _needed(info, key, rule)
+    told = _segments(n_bins, info, label)
+    if not presentations or told is None:
+        return whole_trial(n_bins, float("nan"), float(label))
+    if len(info["onsets"]) and told.target.sum() != label:
+        raise ValueError(
+            f"label must be the sum of the targets, {told.target.sum()}, got {label}: "
+            "give the terminal info of the trial that was heard"
+        )
+    return told
+
+
+def _segments(n_bins: int, info: Mapping[str, Any], label: int) -> Told | None:
+    """The segments of a trial of `n_bins` bins; None if `info` does not tell them.
+
+    Raises ValueError for presentations that cannot be those of such a trial.
+    """
+    if "onsets" not in info or not ("ends" in info or "pattern_bins" in info):
+        return None
+    onsets = whole_array("onsets", info["onsets"], 0, MAX_BINS)
     if "ends" in info:
-        ends = _row("ends", info["ends"])
+        ends = whole_array("ends", info["ends"], 0, MAX_BINS)
     else:
-        ends = onsets + _whole("pattern_bins", _needed(info, "pattern_bins", rule))
+        least = min(len(onsets), 1)  # without presentations it may be anything
+        ends = onsets + whole("pattern_bins", info["pattern_bins"], low=least, high=MAX_BINS)
+    if "targets" in info:
+        owed = whole_array("targets", info["targets"], 0, MAX_TARGET)
+    else:
+        owed = np.zeros(len(onsets), np.int64)
     if not len(onsets) == len(ends) == len(owed):
         raise ValueError(
             "onsets, ends and targets must have one entry per presentation each, "
@@ -63,10 +88,9 @@ def segments_told(n_bins: int, info: Mapping[str, Any], presentations: bool, rul
     if np.any(np.diff(edges) < 0):
         raise ValueError(
             f"presentations must follow one another within the {n_bins} bins heard, got onsets "
-            f"{onsets.tolist()} and ends {ends.tolist()}: an agent must hear every bin of a trial"
+            f"{shown(onsets.tolist())} and ends {shown(ends.tolist())}: an agent must hear every "
+            "bin of a trial"
         )
-    if np.any(owed < 0):
-        raise ValueError(f"targets must be >= 0, got {owed.tolist()}")
     return Told(edges, target, float(label), float("nan"))
 
 
@@ -77,20 +101,3 @@ def _needed(info: Mapping[str, Any], key: str, rule: type) -> Any:
             f"got {sorted(map(str, info))}"
         )
     return info[key]
-
-
-def _whole(name: str, value: Any) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise ValueError(f"{name} must be a whole number, got {value!r}") from None
-    if abs(number) >= 2**53:
-        raise ValueError(f"{name} must be in −2**53 … 2**53, got {number}")
-    return number
-
-
-def _row(name: str, values: Any) -> NDArray[np.int64]:
-    array = np.asarray(values)
-    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
-        raise ValueError(f"{name} must be whole numbers in a row, got {values!r}")
-    return array.astype(np.int64)

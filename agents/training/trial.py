@@ -10,21 +10,28 @@ from numpy.typing import NDArray
 from agents.learning.momentum import apply_change
 from agents.learning.rule import Outcome, RuleParameters
 from agents.model import Arrays, Block
-from agents.simd import any_lane, full, load, repeated, store, unpack, where
+from agents.simd import any_lane, full, load, pack, repeated, store, unpack, where
 from agents.training.slots import (
     LEARN_WIDTH,
     USES_ERROR,
     USES_OUTPUT,
+    USES_READOUT,
     WIDTH,
+    Memory,
+    OwnNumbers,
     State,
     active,
     advance,
     compute_change,
     output,
     run_bins,
+    weigh,
 )
 from gnm_env.compiled import inlined
 from gnm_env.segments import TrialArrays
+
+N_COMMON = len(RuleParameters._fields)
+"""Rows of the parameters that all rules have; a rule's own follow."""
 
 
 class TrialLog(NamedTuple):
@@ -34,7 +41,9 @@ class TrialLog(NamedTuple):
     above: Block
     """1 where the readout is at or above the threshold; kept only for rules that use the error."""
     output: Block
-    """Output of each bin; kept only for rules that see the whole trial."""
+    """Output of each bin; kept only for rules that use it."""
+    readout: Block
+    """X of each bin; kept only for rules that use it, where it is not V itself."""
     counts: Block
     """Output in each segment."""
 
@@ -54,6 +63,8 @@ class RuleBlock(NamedTuple):
     parameters: Block
     velocity: Block
     static: tuple[int, ...]
+    memory: Block
+    """What the rule remembers from trial to trial, (numbers, WIDTH)."""
 
 
 class Scratch(NamedTuple):
@@ -106,11 +117,13 @@ def run_bins_template(
     zero = full(0.0, WIDTH)
     total = zero
     bins_above = zero
+    first = trial.offsets[start]
     for t in range(start, stop):
+        last = trial.offsets[np.uint64(t + 1)]
         state, response = advance(
-            p, model.static, model.arrays, state,
-            trial.channels, trial.offsets[t], trial.offsets[t + 1], t * model.n_notes,
-        )  # fmt: skip
+            p, model.static, model.arrays, state, trial.channels, first, last, t * model.n_notes
+        )
+        first = last
         out = output(response, zero)
         total = total + out
         store(log.V, t, response.V)
@@ -120,6 +133,8 @@ def run_bins_template(
             store(log.above, t, above)
         if USES_OUTPUT:
             store(log.output, t, out)
+        if USES_READOUT:
+            store(log.readout, t, response.X)
     return state, total, bins_above
 
 
@@ -140,13 +155,29 @@ def run_trial_template(p: Any, model: ModelBlock, trial: TrialArrays, log: Trial
         store(log.counts, segment, given)
         if segment % 2 == 0:
             in_noise = in_noise + given
-            blame = blame + bins_above
+            blame = blame + (bins_above if USES_ERROR else given)
         else:
             in_presentations = in_presentations + given
             blame = blame + where(given == trial.target[segment], zero, 1.0)
         owed += trial.target[segment]
     emitted = in_noise + in_presentations
     return Outcome(emitted, full(float(owed), WIDTH), blame > 0.0), in_noise
+
+
+def weighed_template(rule: RuleBlock, told: Any, learns: Any) -> Any:
+    """The correction that the rule makes of what it is told, in the lanes that learn; 0 in others.
+
+    Moves the rule's memory on in these lanes.
+    """
+    zero = full(0.0, WIDTH)
+    own = unpack(OwnNumbers, rule.parameters[N_COMMON:], zero)
+    c, memory = weigh(own, told, unpack(Memory, rule.memory, zero))
+    moved = np.empty_like(rule.memory)
+    pack(moved, memory)
+    for row in range(len(moved)):
+        old = load(rule.memory, row, zero)
+        store(rule.memory, row, where(learns, load(moved, row, zero), old))
+    return where(learns, c, zero)
 
 
 def learn_trial_template(

@@ -14,18 +14,18 @@ from gymnasium.error import ResetNeeded
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gnm_env.base.params import EnvParams
+from gnm_env.base.params import EnvParams, HasParams
 from gnm_env.checks import generator, shown, whole
 from gnm_env.generators import Generators
 
 
-class PatternEnv(gym.Env[NDArray[np.int8], Any]):
+class PatternEnv(HasParams, gym.Env[NDArray[np.int8], Any]):
     """Base of the environments. Subclasses say what `reset` and `step` do."""
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
     def __init__(self, params: EnvParams, action_space: spaces.Space[Any]) -> None:
-        self.task, self.patterns = params.task, params.patterns
+        self._params = params
         self.render_mode = params.render_mode
         self.observation_space = spaces.Box(0, 1, (params.n_inputs,), np.int8)
         self.action_space = action_space
@@ -145,3 +145,11 @@ def spike_from(action: Any) -> int:
     if spike != 0 and spike != 1:
         raise ValueError(f"action must be 0 (silent) or 1 (spike), got {shown(action)}")
     return spike
+
+
+def array_of(actions: Any) -> NDArray[Any]:
+    """`actions` as an array; an empty one where they are none."""
+    try:
+        return np.asarray(actions)
+    except (TypeError, ValueError):  # ragged lists
+        return np.empty(0, object)

@@ -80,6 +80,22 @@ class EnvParams:
         return task_arrays(self.task, self.patterns)
 
 
+class HasParams:
+    """What an environment tells of its arguments; none of it can be changed afterwards."""
+
+    _params: EnvParams
+
+    @property
+    def task(self) -> Task | None:
+        """The task; None where trials come from a data set."""
+        return self._params.task
+
+    @property
+    def patterns(self) -> Patterns | None:
+        """The task's patterns; None where trials come from a data set."""
+        return self._params.patterns
+
+
 @dataclass(frozen=True, kw_only=True)
 class VectorParams:
     """What a vector environment is made from beside the single one's arguments; checks itself.

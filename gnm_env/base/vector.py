@@ -1,12 +1,13 @@
-"""Both environments as native vector environments: many copies, one compiled call a step."""
+"""What the native vector environments share: many copies, one compiled call a step."""
 
 from __future__ import annotations
 
+import copy
 import math
 import operator
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
@@ -16,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from gnm_env.base.env import checked_options
+from gnm_env.base.env import array_of, checked_options
 from gnm_env.base.kernels import (
     COST,
     DISABLED,
@@ -33,7 +34,7 @@ from gnm_env.base.kernels import (
     growing_of,
     new_state,
 )
-from gnm_env.base.params import NO_LIMIT, EnvParams, VectorParams
+from gnm_env.base.params import NO_LIMIT, EnvParams, HasParams, VectorParams
 from gnm_env.checks import MAX_SEED, require_memory, shown, whole
 from gnm_env.generators import Generators
 
@@ -48,7 +49,7 @@ Seeds = int | list[int | None] | None
 Step = tuple[Bits, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
-class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
+class PatternVectorEnv(HasParams, VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     """Base of the vector environments: what they have in common, and the manual of that.
 
     ## Seeding
@@ -87,7 +88,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
                 "draw no pictures; use gymnasium.make or vectorization_mode='sync'"
             )
         self.num_envs, self.copy = vector.num_envs, vector.copy
-        self.task, self.patterns = params.task, params.patterns
+        self._params = params
         self.autoreset_mode = AutoresetMode(vector.autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self._by_hand = self.autoreset_mode == AutoresetMode.DISABLED
@@ -95,7 +96,8 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         self._n_inputs = params.n_inputs
         self.single_observation_space = spaces.Box(0, 1, (self._n_inputs,), np.int8)
         self.single_action_space = action_space
-        n = self.num_envs
+        # Compiled code relies on it, whatever becomes of `num_envs`.
+        self._n = n = self.num_envs
         require_memory(
             f"num_envs = {n:,} with {self._n_inputs:,} channels each",
             20.0 * n * self._n_inputs,
@@ -151,7 +153,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
 
     def _nothing_grown(self) -> Growing:
         """Rows for what has not begun."""
-        n = self.num_envs
+        n = self._n
         return Growing(
             events=np.zeros((n, 8), self._event_type()),
             presentations=np.zeros((n, 8), np.int64),
@@ -173,6 +175,10 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             return kept
         finally:
             self._entry.release()
+
+    def __copy__(self) -> Self:
+        """A deep copy: two environments that share arrays would write over each other."""
+        return copy.deepcopy(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -226,7 +232,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     def _seeded(self) -> Generators:
         """The generators, with seeds from the operating system if none were given yet."""
         if self._generators is None:
-            drawn = [seeding.np_random() for _ in range(self.num_envs)]
+            drawn = [seeding.np_random() for _ in range(self._n)]
             self._seeds = [seed for _, seed in drawn]
             self._generators = Generators(rng for rng, _ in drawn)
         return self._generators
@@ -249,7 +255,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         """
         if seed is None:
             return None
-        n = self.num_envs
+        n = self._n
         expected = f"seed must be a whole number or one per environment, num_envs = {n}"
         try:
             first = operator.index(seed)
@@ -262,7 +268,7 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         """Seeds that are given one by one."""
         if not isinstance(seeds, (Sequence, np.ndarray)) or isinstance(seeds, (str, bytes)):
             raise ValueError(f"{expected}, got {shown(seeds)}")
-        if len(seeds) != self.num_envs:
+        if len(seeds) != self._n:
             raise ValueError(f"{expected}, got {len(seeds)} seeds")
         try:
             return [
@@ -319,11 +325,11 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         """Where to reset."""
         mask = checked_options(options, ("reset_mask",)).get("reset_mask")
         if mask is None:
-            return np.ones(self.num_envs, np.bool_)
+            return np.ones(self._n, np.bool_)
         wrong = not isinstance(mask, np.ndarray) or mask.dtype != np.bool_
-        if wrong or mask.shape != (self.num_envs,) or not mask.any():
+        if wrong or mask.shape != (self._n,) or not mask.any():
             raise ValueError(
-                f"options['reset_mask'] must be a bool array of shape ({self.num_envs},) with at "
+                f"options['reset_mask'] must be a bool array of shape ({self._n},) with at "
                 f"least one True, got {shown(mask)}"
             )
         if self._state is None:
@@ -345,9 +351,9 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
     def _spikes(self, actions: NDArray[Any]) -> NDArray[np.int64]:
         """Actions as int64 (n,); whether each is 0 or 1 the compiled step finds out."""
         checked = array_of(actions)
-        if checked.shape != (self.num_envs,) or checked.dtype.kind not in "iub":
+        if checked.shape != (self._n,) or checked.dtype.kind not in "iub":
             raise ValueError(
-                f"actions must be whole numbers of shape ({self.num_envs},), one per environment, "
+                f"actions must be whole numbers of shape ({self._n},), one per environment, "
                 f"got {checked.dtype} of shape {checked.shape}"
             )
         return np.ascontiguousarray(checked, np.int64)
@@ -374,12 +380,12 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         if self.autoreset_mode != AutoresetMode.SAME_STEP:
             return terminal
         done = self._outcome.done[: self._n_done]
-        final_obs = np.empty(self.num_envs, object)
+        final_obs = np.empty(self._n, object)
         for i, row in zip(
             done.tolist(), self._display.final_obs[: self._n_done].copy(), strict=True
         ):
             final_obs[i] = row
-        mask = np.zeros(self.num_envs, np.bool_)
+        mask = np.zeros(self._n, np.bool_)
         mask[done] = True
         return {
             "final_obs": final_obs,
@@ -387,14 +393,6 @@ class PatternVectorEnv(VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
             "final_info": terminal,
             "_final_info": mask.copy(),
         }
-
-
-def array_of(actions: Any) -> NDArray[Any]:
-    """`actions` as an array; an empty one where they are none."""
-    try:
-        return np.asarray(actions)
-    except (TypeError, ValueError):  # ragged lists
-        return np.empty(0, object)
 
 
 def read_only(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -16,10 +16,10 @@ from gnm_env.segments import segment_at
 from gnm_env.task import Patterns, Task, dense
 from gnm_env.trial import Trial, draw_next
 from gnm_env.trial_task.info import info_of
-from gnm_env.trial_task.params import TrialEnvParams, require_presentations
+from gnm_env.trial_task.params import HasTrialParams, TrialEnvParams, require_presentations
 
 
-class PatternTrialEnv(PatternEnv):
+class PatternTrialEnv(HasTrialParams, PatternEnv):
     """A trial of noise in which fixed spatio-temporal patterns hide.
 
     ## Description
@@ -99,9 +99,6 @@ class PatternTrialEnv(PatternEnv):
         given = {"task": task, "patterns": patterns, "feedback": feedback, **arguments}
         (params,) = from_keywords((TrialEnvParams,), given)
         super().__init__(params, params.action_space)
-        self.trials = params.trials
-        self.feedback, self.output = params.feedback, params.output
-        self.max_output, self.tolerance = params.max_output, params.tolerance
         self._graded = params.graded
         self._n_inputs = params.n_inputs
         if self.trials is None:

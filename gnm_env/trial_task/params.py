@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 import numpy as np
 from gymnasium import spaces
 
-from gnm_env.base.params import EnvParams
+from gnm_env.base.params import EnvParams, HasParams
 from gnm_env.checks import choice, real
 from gnm_env.trials import Trials
 
@@ -78,6 +78,37 @@ class TrialEnvParams(EnvParams):
         if self.graded:
             return spaces.Box(0.0, self.max_output, (1,), np.float64)
         return spaces.Discrete(2)
+
+
+class HasTrialParams(HasParams):
+    """What a trial environment tells of its arguments; none of it can be changed afterwards."""
+
+    _params: TrialEnvParams
+
+    @property
+    def trials(self) -> Trials | None:
+        """The data set that trials come from; None where they are drawn."""
+        return self._params.trials
+
+    @property
+    def feedback(self) -> str:
+        """One of FEEDBACK."""
+        return self._params.feedback
+
+    @property
+    def output(self) -> str:
+        """One of OUTPUT."""
+        return self._params.output
+
+    @property
+    def max_output(self) -> float:
+        """Greatest amount in one bin, where output is graded."""
+        return self._params.max_output
+
+    @property
+    def tolerance(self) -> float:
+        """Errors up to this count as none."""
+        return self._params.tolerance
 
 
 def require_presentations(name: str) -> NoReturn:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gnm_env.base.env import array_of
 from gnm_env.base.kernels import COST, DENSE, SIGN, Config, Episodes, Growing, growing_of
 from gnm_env.base.params import VectorParams, from_keywords, signature
-from gnm_env.base.vector import PatternVectorEnv, Step, array_of, read_only
+from gnm_env.base.vector import PatternVectorEnv, Step, read_only
 from gnm_env.checks import require_memory
 from gnm_env.reused import ReusedRows
 from gnm_env.task import Patterns, Task
@@ -24,12 +25,12 @@ from gnm_env.trial_task.kernels import (
     step_drawn,
     step_recorded,
 )
-from gnm_env.trial_task.params import TrialEnvParams
+from gnm_env.trial_task.params import HasTrialParams, TrialEnvParams
 
 FEEDBACK_NUMBER = {"cost": COST, "sign": SIGN, "dense": DENSE}
 
 
-class PatternTrialVectorEnv(PatternVectorEnv):
+class PatternTrialVectorEnv(HasTrialParams, PatternVectorEnv):
     """`gnm/PatternTrial-v0` many times over; see `PatternTrialEnv` for the task itself.
 
     Made by `gymnasium.make_vec("gnm/PatternTrial-v0", num_envs)`. Takes the arguments of the single
@@ -57,9 +58,6 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         params, vector = from_keywords((TrialEnvParams, VectorParams), given)
         self._graded = params.graded
         super().__init__(params, vector, params.action_space)
-        self.trials = params.trials
-        self.feedback, self.output = params.feedback, params.output
-        self.max_output, self.tolerance = params.max_output, params.tolerance
         n = self.num_envs
         records = np.zeros(n, TRIAL_STATE)
         records["anew"] = 1
@@ -123,8 +121,8 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        if state["trials"] is not None:  # one data set, not two equal ones
-            state["_source"] = state["_source"]._replace(trials=state["trials"].arrays)
+        if state["_params"].trials is not None:  # one data set, not two equal ones
+            state["_source"] = state["_source"]._replace(trials=state["_params"].trials.arrays)
         super().__setstate__(state)
 
     def _reseeded(self, i: int) -> None:
@@ -146,9 +144,9 @@ class PatternTrialVectorEnv(PatternVectorEnv):
     def _amounts(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """Actions as float64 (n,); whether each is in range the compiled step finds out."""
         checked = array_of(actions)
-        if checked.shape != (self.num_envs, 1) or checked.dtype.kind not in "fiub":
+        if checked.shape != (self._n, 1) or checked.dtype.kind not in "fiub":
             raise ValueError(
-                f"actions must be numbers of shape ({self.num_envs}, 1), one per environment, "
+                f"actions must be numbers of shape ({self._n}, 1), one per environment, "
                 f"got {checked.dtype} of shape {checked.shape}"
             )
         return np.ascontiguousarray(checked[:, 0], np.float64)
@@ -193,7 +191,7 @@ class PatternTrialVectorEnv(PatternVectorEnv):
         if results.label_only.any():
             info["label_only"] = results.label_only.copy()
             info["_label_only"] = results.label_only.copy()
-        ends, mask = np.full(self.num_envs, None, object), np.zeros(self.num_envs, np.bool_)
+        ends, mask = np.full(self._n, None, object), np.zeros(self._n, np.bool_)
         for i, first, second, _, end in heads:
             if second > first and results.pattern_bins[i] == 0:
                 ends[i], mask[i] = numbers[end : end + second - first], True

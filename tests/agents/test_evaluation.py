@@ -301,3 +301,90 @@ def test_trials_of_which_only_labels_are_known_are_answered_too() -> None:
     assert result.table.shape[:2] == (1, 0)
     assert result.wrong.tolist() == [2]
     assert result.absolute.tolist() == [3.0]
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+
+class Answering:
+    """A policy that answers whatever it was made with."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def predict(self, *arguments: Any) -> Any:
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (3, "predict must return the actions and the state, got 3"),
+        ((np.array([7, 0]), None), "one action each, 0 or 1"),
+        ((np.array([np.nan, 0]), None), "one action each, 0 or 1"),
+        ((np.zeros(5), None), "predict must answer 2 streams with one action each"),
+    ],
+)
+def test_a_policy_that_answers_with_anything_but_spikes_is_refused(
+    answer: Any, message: str
+) -> None:
+    policy = Answering(answer)
+    with pytest.raises(ValueError, match=message):
+        noisy_performance(policy, EASY, EASY_PATTERNS, runs=2, cap=5)
+    with pytest.raises(ValueError, match=message):
+        answers(policy, EASY, EASY_PATTERNS, trials=2)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"runs": 10**12}, "runs must be at most 10,000,000"),
+        ({"cap": 10**30}, "cap must be at most 1,000,000,000"),
+        ({"shared": "no"}, "shared must be True or False, got 'no'"),
+        ({"seed": -1}, "seed must be >= 0"),
+    ],
+)
+def test_measurements_have_limits_that_are_said(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        noisy_performance(easy_agent(), EASY, EASY_PATTERNS, **keywords)
+    with pytest.raises(ValueError, match="trials must be at most 1,000,000,000,000"):
+        answers(easy_agent(), EASY, EASY_PATTERNS, trials=10**30)
+
+
+@pytest.mark.parametrize("values", [[], None, "x", [np.nan], [[1], [2, 3]], [np.inf], {}, 3, [1j]])
+def test_intervals_are_of_finite_numbers(values: Any) -> None:
+    with pytest.raises(ValueError, match="survived must be"):
+        mistake_rate(values)
+    with pytest.raises(ValueError, match="values must be"):
+        bootstrap_interval(values)
+
+
+@pytest.mark.parametrize("survived", [[-5], [1.5], [20_000]])
+def test_runs_survive_a_whole_number_of_bins_up_to_the_cap(survived: Any) -> None:
+    with pytest.raises(ValueError, match="survived must be whole numbers of bins in 0 … cap"):
+        mistake_rate(survived)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"resamples": 10**14}, "resamples must be at most 1,000,000,000"),
+        ({"resamples": 10**9}, "1,000,000,000 resamples of 1,000 values needs"),
+        ({"seed": "x"}, "seed must be a whole number"),
+        ({"seed": -1}, "seed must be >= 0"),
+    ],
+)
+def test_a_bootstrap_asks_for_memory_before_it_takes_it(
+    keywords: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        bootstrap_interval(np.arange(1_000), **keywords)
+
+
+@pytest.mark.parametrize("agent", [None, 3, GNM(), "x"])
+def test_a_recording_needs_an_agent_and_a_trial(agent: Any) -> None:
+    trial = draw_trial(EASY, EASY_PATTERNS, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="agent must be an agent, such as NeuronAgent makes"):
+        record(agent, trial)
+    with pytest.raises(ValueError, match=r"trial must be a gnm_env.Trial, got"):
+        record(easy_agent(), agent)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +12,9 @@ import numpy as np
 import pytest
 
 from agents import GNM, LIF, MST, AggregateLabel, ErrorTrace, NeuronAgent, record
+from agents.continuous import ContinuousAgent, ContinuousGNM
+from agents.learning.rule import Rule
+from agents.network import BackPropagation, Network, NetworkAgent
 from agents.neurons.neuron import Neuron
 from gnm_env import Task, Trial, draw_trial
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, BUSY_WEIGHT, play
@@ -301,3 +306,128 @@ def test_stable_baselines_can_evaluate_it_as_a_policy() -> None:
     assert returns == by_hand
     assert [length - 1 for length in lengths] == returns  # the bin of the mistake earns nothing
     assert max(returns) > 3
+
+
+@pytest.mark.parametrize("begins", ["x", [0.5, 1], [float("nan"), 1], [[True], [False]], [True], 3])
+def test_predict_asks_for_one_truth_per_stream(begins: Any) -> None:
+    with pytest.raises(ValueError, match="episode_start must"):
+        busy_agent().predict(np.zeros((2, N), np.int8), None, begins)
+
+
+def test_predict_refuses_a_state_of_nan_and_rows_of_unequal_length() -> None:
+    agent = busy_agent()
+    _, (state,) = agent.predict(np.zeros((2, N), np.int8))
+    with pytest.raises(ValueError, match="state must hold numbers, got NaN"):
+        agent.predict(np.zeros((2, N), np.int8), (np.full_like(state, np.nan),))
+    with pytest.raises(ValueError, match="an observation must hold the bits of a bin"):
+        agent.predict([[0], [1, 0]])  # type: ignore[arg-type]
+
+
+# --- learn ---------------------------------------------------------------------------------------
+
+
+def heard(rule: Rule, bins: int = 9) -> NeuronAgent:
+    agent = NeuronAgent(GNM(), rule, N)
+    for _ in range(bins):
+        agent.act(np.ones(N, np.int8))
+    return agent
+
+
+SOUND = {"label": 1, "onsets": [2], "ends": [5], "classes": [0], "targets": [1]}
+
+
+@pytest.mark.parametrize("rule", [AggregateLabel(0.01), ErrorTrace(0.01)], ids=lambda r: r.name)
+@pytest.mark.parametrize(
+    ("info", "message"),
+    [
+        (None, "info must be the terminal info of the trial, a dict, got None"),
+        (3, "info must be the terminal info"),
+        ({**SOUND, "label": 1.7}, "label must be a whole number, got 1.7"),
+        ({**SOUND, "label": 2**62}, "label must be at most"),
+        ({**SOUND, "onsets": [7]}, "presentations must follow one another within the 9 bins"),
+        ({**SOUND, "ends": [10]}, "presentations must follow one another within the 9 bins"),
+        ({**SOUND, "onsets": [2, 2]}, "must have one entry per presentation each"),
+        ({**SOUND, "onsets": [0.5]}, "onsets must be whole numbers"),
+        ({**SOUND, "targets": [-1]}, "targets must lie in 0 …"),
+        ({**SOUND, "targets": [2**62]}, "targets must lie in 0 …"),
+        ({**SOUND, "emitted": 40}, "the environment counted 40 of output"),
+        ({**SOUND, "emitted": "x"}, "emitted must be a number"),
+    ],
+)
+def test_an_info_that_cannot_be_of_this_trial_is_refused_and_teaches_nothing(
+    rule: Rule, info: Any, message: str
+) -> None:
+    agent = heard(rule)
+    before = agent.weights.copy()
+    with pytest.raises(ValueError, match=message):
+        agent.learn(-1.0, info)
+    assert np.array_equal(agent.weights, before) and agent.trials == 0
+
+
+def test_targets_and_label_must_agree_for_a_rule_that_sees_both() -> None:
+    with pytest.raises(ValueError, match="label must be the sum of the targets, 1, got 5"):
+        heard(ErrorTrace(0.01)).learn(-1.0, {**SOUND, "label": 5})
+
+
+def test_nothing_is_learned_before_a_bin_was_heard() -> None:
+    agent = busy_agent()
+    with pytest.raises(ValueError, match="a trial must be heard before it can be learned from"):
+        agent.learn(-1.0, SOUND)
+    assert agent.trials == 0
+
+
+def test_a_velocity_that_was_written_to_is_checked_at_the_next_trial() -> None:
+    agent = busy_agent()
+    agent.velocity[1] = np.nan
+    with pytest.raises(ValueError, match="velocity must be finite, got nan for input 1"):
+        agent.begin_trial()
+
+
+def test_momentum_is_the_former_name_of_the_velocity_with_the_same_checks() -> None:
+    agent = busy_agent()
+    agent.momentum = np.arange(N)
+    assert agent.momentum is agent.velocity and agent.velocity.tolist() == list(range(N))
+    with pytest.raises(ValueError, match="velocity must have shape"):
+        agent.momentum = np.zeros(N + 1)
+
+
+def test_a_copy_with_a_parameter_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"a GNM has the parameters alpha, eta, .*got 'bogus'"):
+        busy_agent().replaced(bogus=1)
+
+
+# --- copies --------------------------------------------------------------------------------------
+
+KINDS: dict[str, Any] = {
+    "neuron": lambda: NeuronAgent(GNM(eta=0.5), AggregateLabel(0.01, fraction=0.25), N),
+    "continuous": lambda: ContinuousAgent(ContinuousGNM(), AggregateLabel(0.01, fraction=0.25), N),
+    "network": lambda: NetworkAgent(Network(hidden=3), BackPropagation(), N),
+}
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda a: pickle.loads(pickle.dumps(a))])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_copy_goes_on_where_the_agent_stands_even_amid_a_trial(kind: str, copied: Any) -> None:
+    agent = KINDS[kind]()
+    agent.weights = np.linspace(0.1, 0.9, agent.weights.size)
+    agent.velocity = 0.01
+    agent.note = "my own"
+    trial = some_trial()
+    bits = rows(trial)
+    agent.begin_trial()
+    first = [agent.act(row) for row in bits[:20]]
+    other = copied(agent)
+    assert other.note == "my own"
+    info = {
+        "label": trial.label, "onsets": trial.onsets, "ends": trial.ends, "targets": trial.targets,
+    }  # fmt: skip
+    given = []
+    for each in (agent, other):
+        given.append(first + [each.act(row) for row in bits[20:]])
+        each.learn(-1.0, info)
+    assert given[0] == given[1] and sum(given[0]) > 0
+    assert np.array_equal(agent.weights, other.weights)
+    assert np.array_equal(agent.velocity, other.velocity) and (agent.velocity != 0.01).any()
+    assert other.trials == agent.trials == 1
+    other.weights[:] = 0.0
+    assert agent.weights.any()

@@ -265,3 +265,9 @@ def test_a_full_disk_stops_nothing(tmp_path: Path) -> None:
     assert done.stderr.count("RuntimeWarning") == 1
     assert cached(tmp_path) == []
     assert printed(CALL, tmp_path) == ("2.0", "0")
+
+
+def test_a_source_that_has_gone_since_it_was_imported_stops_nothing(small: Path) -> None:
+    gone = CALL.replace("import third\n", "import third\nimport os; os.remove('small.py')\n")
+    done = ran(gone, small)
+    assert done.stdout.split() == ["2.0", "0"]

@@ -38,7 +38,7 @@ def checkpoint(tmp_path: Path) -> Path:
 def script(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "scripts/chemistry.py", *map(str, arguments)],
-        capture_output=True, text=True, timeout=120, cwd=ROOT,
+        capture_output=True, text=True, timeout=600, cwd=ROOT,
     )  # fmt: skip
 
 

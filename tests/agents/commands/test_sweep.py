@@ -3,6 +3,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -36,7 +37,7 @@ def run(folder: Path, **settings: Any) -> xr.Dataset:
 def script(name: str, *arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, str(ROOT / "scripts" / name), *map(str, arguments)],
-        capture_output=True, text=True, timeout=120, cwd=cwd,
+        capture_output=True, text=True, timeout=600, cwd=cwd,
     )  # fmt: skip
 
 
@@ -53,7 +54,7 @@ def helper(name: str, *arguments: object) -> dict[str, Any]:
     """Run one of the programs beside this file; its last line is what it has to tell."""
     ended = subprocess.run(
         [sys.executable, "-m", f"tests.agents.experiments.{name}", *map(str, arguments)],
-        capture_output=True, text=True, timeout=120, cwd=ROOT,
+        capture_output=True, text=True, timeout=600, cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
@@ -190,7 +191,7 @@ def test_without_an_extra_a_script_says_in_one_line_which(tmp_path: Path) -> Non
     (tmp_path / "zarr.py").write_text("raise ModuleNotFoundError(name='zarr')")
     ended = subprocess.run(
         [sys.executable, str(ROOT / "scripts" / "sweep.py"), "F1"],
-        capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        capture_output=True, text=True, timeout=600, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
     )  # fmt: skip
 
@@ -235,3 +236,68 @@ def test_a_dask_worker_that_dies_costs_its_block_only(tmp_path: Path) -> None:
     assert told["killed"] not in told["workers_at_the_end"]
     assert told["computed"] - 18 in (0, 1), "only the block at which the worker died is done twice"
     xr.testing.assert_identical(read(tmp_path / "toy"), run(tmp_path / "whole", pause=0.2))
+
+
+OWN = """
+from agents.experiments import Axis, class_counts, pattern_seeds, training
+
+def mine(size, seeds):
+    axes = (class_counts(1), pattern_seeds(seeds or (0, 1)), Axis("rate", (0.01, 0.02)),
+            Axis("alpha", (0.2, 0.3), chunk=0))
+    return training("mine", "My neuron", axes, neuron=NEURON, trials=50, runs=2, cap=100)
+
+wrong = lambda size, seeds: training(
+    "wrong", "", (class_counts(1), pattern_seeds((0,)), Axis("colour", ("red",))))
+something = 7
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A folder away from the checkout with a neuron and an experiment of one's own."""
+    shutil.copy(ROOT / "tests" / "agents" / "own" / "my_neurons.py", tmp_path)
+    text = OWN.replace("NEURON", repr("my_neurons.py:ALIF"))
+    (tmp_path / "my_experiment.py").write_text(text)
+    return tmp_path
+
+
+def test_an_experiment_of_ones_own_runs_with_a_neuron_of_ones_own(own: Path) -> None:
+    ended = script("sweep.py", "my_experiment.py:mine", "--seeds", "3", "--json", cwd=own)
+    assert ended.returncode == 0, ended.stderr
+    told = json.loads(ended.stdout.splitlines()[-1])
+    assert told["done"] == told["blocks"] == 2 * 3
+    results = read(own / told["store"])
+    assert results["survived"].dims == ("classes", "pattern_seed", "rate", "alpha", "run")
+    again = script("sweep.py", "my_experiment:mine", "--seeds", "3", cwd=own)
+    assert again.returncode == 0, again.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("my_experiment.py:wrong", "nothing takes the setting 'colour': neither the task"),
+        ("my_experiment.py:something", "must be an Experiment, or a function"),
+        ("my_experiment.py:nothing", "must be an Experiment, or a function"),
+        ("nowhere.py:mine", "there is no file nowhere.py"),
+    ],
+)
+def test_what_is_no_experiment_is_refused_and_leaves_no_store(
+    own: Path, name: str, complaint: str
+) -> None:
+    ended = script("sweep.py", name, cwd=own)
+    assert ended.returncode == 2
+    assert complaint in ended.stderr
+    assert len(ended.stderr.strip().splitlines()) == 1, ended.stderr
+    assert not (own / "results").exists()
+
+
+def test_an_agent_with_classes_of_ones_own_is_scored_once_they_are_imported(own: Path) -> None:
+    words = ("--neuron", "my_neurons.py:ALIF", "--trials", "20", "--alpha", "0.2")
+    ended = script("train.py", *words, "--out", "run", cwd=own)
+    assert ended.returncode == 0, ended.stderr
+    missing = script("evaluate.py", "run/agent.npz", "--runs", "2", cwd=own)
+    assert missing.returncode == 2 and "import my_neurons first" in missing.stderr
+    scored = script(
+        "evaluate.py", "run/agent.npz", "--runs", "2", "--import", "my_neurons.py", cwd=own
+    )
+    assert scored.returncode == 0, scored.stderr

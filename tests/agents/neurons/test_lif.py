@@ -68,3 +68,8 @@ def test_a_bad_parameter_is_refused_by_name_value_and_remedy(
     with pytest.raises(ValueError, match=f"^{field} must be .*{value}") as refusal:
         LIF(**{field: value})
     assert remedy in str(refusal.value)
+
+
+def test_the_pause_after_a_spike_has_an_upper_limit() -> None:
+    with pytest.raises(ValueError, match="refractory must be at most 1,000,000,000"):
+        LIF(refractory=2**62)

@@ -75,3 +75,9 @@ def test_a_bad_parameter_is_refused_by_name_value_and_remedy(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         MST(**parameters)
+
+
+@pytest.mark.parametrize(("tau_m", "tau_s"), [(1e308, 1e-308), (20.0, 5e-324), (1e20, 1e19)])
+def test_time_constants_that_leave_no_response_are_refused(tau_m: float, tau_s: float) -> None:
+    with pytest.raises(ValueError, match="must leave a response to a spike"):
+        MST(tau_m=tau_m, tau_s=tau_s)

@@ -216,7 +216,8 @@ class TestGradedOutput:
         assert rewards == [-0.5, 0, 0, 0, 0.0, 0, 0, -2.0, 0, 0, 0, 0]
 
     @pytest.mark.parametrize(
-        "action", [-0.1, 4.1, np.nan, [1.0, 2.0], None, "x", "1", ["0.5"], 1j, [[]], [1, [2]], {}]
+        "action",
+        [-0.1, 4.1, np.nan, [1.0, 2.0], None, "x", "1", ["0.5"], 1j, [[]], [1, [2]], {}],
     )
     def test_an_amount_outside_the_space_is_refused(self, action: Any) -> None:
         env = gym.make(ID, output="graded", max_output=4.0)
