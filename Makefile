@@ -14,8 +14,8 @@ RECENT = import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 WHOLE = import sys, pip; sys.exit(sys.version_info < (3, 11) or sys.prefix == sys.base_prefix)
 NEEDS = $(VENV)/.made pyproject.toml constraints.txt
 
-.PHONY: help train evaluate show test test-slow test-checked campaign format benchmark reproduce \
-	report-check league docs docs-open clean distclean
+.PHONY: help train evaluate show explore test test-slow test-checked campaign format benchmark \
+	reproduce report-check league docs docs-open clean distclean
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s%s\n", $$1, $$2 }' Makefile
@@ -28,6 +28,9 @@ evaluate: $(VENV)/.for-train  ## score a saved neuron: make evaluate ARGS=CHECKP
 
 show: $(VENV)/.for-train  ## draw how a neuron works: hysteresis, response to each class
 	@$(RUN) scripts/show.py $(ARGS)
+
+explore: $(VENV)/.for-explore  ## move sliders in the browser, see a neuron learn anew
+	@$(RUN) -m agents.commands explore $(ARGS)
 
 test: $(VENV)/.for-test  ## formatter, linter, type checker and all fast tests
 	$(RUN) -m ruff format --check .
@@ -83,10 +86,15 @@ $(VENV)/.for-train: $(NEEDS)
 	@$(INSTALL) -e ".[pictures]"
 	@touch $@
 
+$(VENV)/.for-explore: $(NEEDS)
+	@echo "Installing what the explorer needs into $(VENV) ..."
+	@$(INSTALL) -e ".[explore]"
+	@touch $@
+
 $(VENV)/.for-test: $(NEEDS)
 	@echo "Installing what the tests need into $(VENV); with torch this takes minutes ..."
-	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,docs,dev]"
-	@touch $(VENV)/.for-train $(VENV)/.for-reproduce $(VENV)/.for-league $(VENV)/.for-docs $@
+	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,docs,explore,video,dev]"
+	@touch $(VENV)/.for-train $(VENV)/.for-explore $(VENV)/.for-reproduce $(VENV)/.for-league $(VENV)/.for-docs $@
 
 $(VENV)/.for-benchmark: $(NEEDS)
 	@echo "Installing what the benchmark needs into $(VENV); with torch this takes minutes ..."

@@ -36,9 +36,11 @@ from agents.neurons.lif import LIF
 from agents.neurons.mst import MST
 from agents.plotting import plot
 from agents.recording import Recording, record
+from agents.trained import pretrained
 from agents.training.batch import Answers
 from agents.training.loop import WeightOverflow, train
 from agents.training.many import train_many
+from agents.watching import play
 
 __all__ = [
     "GNM",
@@ -72,7 +74,9 @@ __all__ = [
     "load_checkpoint",
     "mistake_rate",
     "noisy_performance",
+    "play",
     "plot",
+    "pretrained",
     "record",
     "train",
     "train_many",

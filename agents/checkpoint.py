@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from agents import registry
 from agents.learning.rule import NoMemory
+from gnm_env.checks import generator, whole
 from gnm_env.files import ArraySpec, atomic_write, open_arrays, write_arrays
 from gnm_env.task import Patterns, Task, task_arrays
 
@@ -108,7 +109,7 @@ def save_agent(
         contents["patterns"] = np.packbits(patterns.dense())
         header["patterns_shape"] = patterns.shape
     if rng is not None:
-        state = rng.bit_generator.state
+        state = generator("rng", rng).bit_generator.state
         if state["bit_generator"] not in _BIT_GENERATORS:
             raise ValueError(
                 f"a checkpoint cannot keep a generator of kind {state['bit_generator']}; "
@@ -225,7 +226,10 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
 
 
 def _class(kind: str, named: dict[str, Any]) -> Any:
-    return registry.find_class(kind, named["name"], named.get("class"))
+    home = named.get("class")  # format 1 does not tell it
+    if home is not None and not (isinstance(home, str) and ":" in home):
+        raise ValueError(f"its header does not name the class of its {kind}, but {home!r}")
+    return registry.find_class(kind, named["name"], home)
 
 
 def _task(header: dict[str, Any]) -> Task | None:
@@ -235,7 +239,7 @@ def _task(header: dict[str, Any]) -> Task | None:
 def _patterns(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Patterns | None:
     if "patterns_shape" not in header:
         return None
-    shape = tuple(int(n) for n in header["patterns_shape"])
+    shape = tuple(whole("patterns_shape", n, low=1) for n in header["patterns_shape"])
     n_bits = math.prod(shape)
     if min(shape, default=0) < 1 or len(arrays["patterns"]) != -(-n_bits // 8):
         raise ValueError(f"its patterns do not fill the shape {shape}")

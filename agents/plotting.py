@@ -155,7 +155,7 @@ def plot(
         0 and by what it owes, (b) readout with its threshold and the output spikes, or for an agent
         in continuous time the bins that give S, (c) with `history` the learning curve.
     """
-    trial = _shown_trial(task, patterns)
+    trial = shown_trial(task, patterns)
     heights = (1.3, 1, 1)[: 2 + (history is not None)]
     with styled():
         import matplotlib.pyplot as plt
@@ -251,8 +251,8 @@ def _model(agent: Any) -> Any:
     return agent.neuron if hasattr(agent, "neuron") else agent.network
 
 
-def _shown_trial(task: Task | Trials, patterns: Patterns | None, seed: int = 7) -> Trial:
-    """A trial with every class in it, of ordinary length, for a picture."""
+def shown_trial(task: Task | Trials, patterns: Patterns | None, seed: int = 7) -> Trial:
+    """A trial with every class in it, of ordinary length, for a picture; `seed` chooses it."""
     source = source_of(task, patterns)
     if isinstance(task, Trials):
         return task[int(np.argmax(task.labels >= np.median(task.labels)))]

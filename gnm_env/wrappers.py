@@ -33,6 +33,9 @@ __all__ = [
 ]
 
 
+TRACE_SCALE = 1 / 3
+"""Standard deviation of a trace under noise, unless told otherwise: the one that Adam learns at."""
+
 MAX_DECAYS = 1_000
 """Most traces of one channel."""
 
@@ -222,7 +225,7 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
     Args:
         env: an environment with binary observations of shape (N,).
         decays: α of each trace, in (0, 1]; 1 gives the bits themselves, scaled.
-        scale: standard deviation of a trace under noise.
+        scale: standard deviation of a trace under noise; ⅓ unless told otherwise.
         previous_action: append the action of the bin before (0 in the first bin).
         own_decay: if given, append the trace y(t) = (1−own_decay) y(t−1) + action(t−1) of the
             agent's own spikes, unscaled.
@@ -239,7 +242,7 @@ class SynapticTrace(gym.Wrapper[NDArray[np.float32], Any, Any, Any], RecordConst
         self,
         env: gym.Env[Any, Any],
         decays: ArrayLike = (0.3,),
-        scale: float = 1.0,
+        scale: float = TRACE_SCALE,
         previous_action: bool = False,
         own_decay: float | None = None,
         rate: float | None = None,
@@ -284,7 +287,7 @@ class VectorSynapticTrace(
         self,
         env: VectorEnv[Any, Any, Any],
         decays: ArrayLike = (0.3,),
-        scale: float = 1.0,
+        scale: float = TRACE_SCALE,
         previous_action: bool = False,
         own_decay: float | None = None,
         rate: float | None = None,

@@ -24,6 +24,8 @@ VERBS = {
     "train": "train a neuron or a network; score it, save it, draw it",
     "evaluate": "score a saved agent of any kind",
     "show": "draw how a neuron works",
+    "explore": "move sliders in the browser and see a neuron learn anew",
+    "watch": "see a saved agent answer, in a window or as a GIF or MP4",
     "train-rl": "train a Stable-Baselines3 agent on the aggregate label",
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",

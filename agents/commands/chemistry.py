@@ -64,7 +64,7 @@ class Responses:
     Attributes:
         deterministic: with infinitely many molecules.
         shown: for each number of molecules the first stochastic run.
-        S: float64 (runs, K) for each number of molecules, S of each occurrence in each run.
+        S: float64 (runs, K) for each number of molecules, S of each presentation in each run.
     """
 
     deterministic: Course

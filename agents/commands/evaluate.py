@@ -70,7 +70,7 @@ def _opened(path: Path, trust: bool) -> tuple[Any, Task | None, Patterns | None]
         saved = load_checkpoint(path)
         return saved.agent, saved.task, saved.patterns
     from agents import rl
-    from agents.rl.folder import BEST, MODEL
+    from agents.rl.checkpoint import BEST, MODEL
     from agents.rl.trust import require_trust
 
     require_trust(trust, path / MODEL, path / BEST)

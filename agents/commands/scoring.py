@@ -71,7 +71,7 @@ def _table(given: dict[str, Any]) -> list[str]:
     most = max(int(np.flatnonzero(table.sum(axis=0)).max(initial=0)), *given["owed"], 1)
     last = table.shape[1] - 1
     heads = [f"{k}+" if k == last else str(k) for k in range(most + 1)]
-    lines = ["", "answers: of the occurrences of each class, % given so many spikes"]
+    lines = ["", "responses: of the presentations of each class, % given so many spikes"]
     lines.append(f"  {'class':>5} {'owed':>4}  " + "".join(f"{head:>8}" for head in heads))
     for class_, (owed, row) in enumerate(zip(given["owed"], table, strict=True)):
         shares = 100.0 * row[: most + 1] / max(row.sum(), 1)
@@ -80,6 +80,6 @@ def _table(given: dict[str, Any]) -> list[str]:
             for spikes, share in enumerate(shares)
         )
         lines.append(f"  {class_:>5} {owed:>4}  {cells}")
-    alarms = given["false_positives_per_1000_noise_bins"]
-    lines.append(f"  false alarms: {alarms:.2f} per 1,000 bins of noise")
+    rate = given["false_positives_per_1000_noise_bins"]
+    lines.append(f"  false positives: {rate:.2f} per 1,000 bins of noise")
     return lines

@@ -24,6 +24,8 @@ EXTRAS = {
     **dict.fromkeys(("roadrunner", "libsbml", "antimony"), "chemistry"),
     **dict.fromkeys(("dask", "distributed"), "cluster"),
     "matplotlib": "pictures",
+    "tornado": "explore",
+    **dict.fromkeys(("PIL", "imageio_ffmpeg"), "video"),
 }
 """Which extra of the package brings what may be missing."""
 

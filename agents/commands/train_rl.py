@@ -31,9 +31,9 @@ from agents.commands import fields
 from agents.commands.output import Output
 from agents.commands.scoring import report, score
 from agents.commands.terminal import EVALUATION_SEED, Parser, Stopped, at_least, share
-from agents.rl import RECIPES, load, make_rl_agent, training_env
+from agents.rl import HYPERPARAMETERS, load, make_rl_agent, training_env
 from agents.rl.callbacks import Evaluation
-from agents.rl.folder import (
+from agents.rl.checkpoint import (
     BEST,
     MODEL,
     Description,
@@ -42,7 +42,7 @@ from agents.rl.folder import (
     load_model,
     save_model,
 )
-from agents.rl.recipes import n_parameters
+from agents.rl.hyperparameters import n_parameters
 from agents.rl.trust import require_trust
 from gnm_env import Patterns, Task
 from gnm_env.files import atomic_write
@@ -55,14 +55,14 @@ STEPS = {1: 2_000_000, 2: 8_000_000}
 def options(parser: Parser) -> None:
     add = parser.add_argument
     # fmt: off
-    add("--algo", choices=tuple(RECIPES), help="(default ppo)")
+    add("--algo", choices=tuple(HYPERPARAMETERS), help="(default ppo)")
     add("--feedback", choices=("cost", "dense"), help="(default cost)")
     add("--steps", type=at_least(1), metavar="N",
         help=f"bins to hear in all (default {STEPS[1]:,}, with more classes {STEPS[2]:,})")
     share(parser, "--seed", help="of the stream, the initial weights and exploration")
     share(parser, "--pattern-seed")
     add("--n-envs", type=at_least(1), metavar="N",
-        help="environments side by side (default: the recipe's)")
+        help="environments side by side (default: as --algo has them)")
     add("--evaluations", type=at_least(0), default=5, metavar="N",
         help="evaluations on endless streams during training, and one at its end; 0 for none: "
         "the last agent is kept, not the best (default 5)")
@@ -176,7 +176,9 @@ def wanted(options: argparse.Namespace) -> Description:
         return about
     task, kind = fields.made(Task, options), options.algo or "ppo"
     patterns = Patterns.draw(task, options.pattern_seed or 0)
-    return Description(kind, RECIPES[kind].senses, options.feedback or "cost", task, patterns)
+    return Description(
+        kind, HYPERPARAMETERS[kind].observation, options.feedback or "cost", task, patterns
+    )
 
 
 def refuse_contradictions(about: Description, options: argparse.Namespace) -> None:
@@ -240,7 +242,7 @@ def learn(
     callback = None
     if options.evaluations:
         callback = Evaluation(
-            folder, about.task, about.patterns, about.senses,
+            folder, about.task, about.patterns, about.observation,
             every=(steps - model.num_timesteps) // options.evaluations // model.n_envs,
             seed=EVALUATION_SEED + options.runs,
         )  # fmt: skip

@@ -146,12 +146,12 @@ def _protocol(part: str) -> dict[str, Any]:
         kinds += [find_model("network"), find_rule("bp")]
         defaults = {kind.name: asdict(kind()) for kind in kinds}
     else:
-        from agents.rl import RECIPES
+        from agents.rl import HYPERPARAMETERS
 
         defaults = {
-            kind: {"senses": asdict(recipe.senses), "n_envs": recipe.n_envs}
-            | {name: str(value) for name, value in recipe.settings(recipe.n_envs).items()}
-            for kind, recipe in RECIPES.items()
+            kind: {"observation": asdict(chosen.observation), "n_envs": chosen.n_envs}
+            | {name: str(value) for name, value in chosen.settings(chosen.n_envs).items()}
+            for kind, chosen in HYPERPARAMETERS.items()
         }
     return {
         "milestones": list(MILESTONES),
@@ -243,12 +243,12 @@ def _neuron(setting: Setting, sheet: ScoreSheet) -> int:
 
 
 def _rl_agent(setting: Setting, sheet: ScoreSheet) -> int:
-    """One of the recipes; scored between rollouts."""
+    """One of Stable-Baselines3's kinds; scored between rollouts."""
     import torch
 
     from agents.rl import SB3Agent, make_rl_agent, training_env
     from agents.rl.callbacks import Milestones
-    from agents.rl.recipes import RECIPES, n_parameters
+    from agents.rl.hyperparameters import HYPERPARAMETERS, n_parameters
 
     torch.set_num_threads(1)
     kind, task = setting["algorithm"], sheet.task
@@ -262,7 +262,7 @@ def _rl_agent(setting: Setting, sheet: ScoreSheet) -> int:
         1_000 * setting["pattern_seed"],
         spike_probability=setting.get("spike_probability", 0.01),
     )
-    agent = SB3Agent(model, task, RECIPES[kind].senses)
+    agent = SB3Agent(model, task, HYPERPARAMETERS[kind].observation)
 
     def score(milestone: int, heard: int, seconds: float) -> None:
         sheet.score(MILESTONES.index(milestone), agent, heard, seconds)

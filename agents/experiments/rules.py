@@ -101,7 +101,7 @@ def draw(results: Results) -> Figure:
     figure, axes = panels(1, len(counts), width=WIDE, height=0.28 * len(LEARNERS) + 0.9)
     colours = {"A": "C0", "A′": "C2", "B": "C1"}
     rng = np.random.default_rng(0)
-    for axis, classes in zip(np.atleast_1d(axes), counts, strict=True):
+    for axis, classes in zip(axes[0], counts, strict=True):
         for place, name in enumerate(LEARNERS):
             row = by_seed(scores.sel(classes=classes, learner=name))
             colour = colours[name.partition(":")[0]]
@@ -115,7 +115,7 @@ def draw(results: Results) -> Figure:
             xlabel="bins survived", yticks=range(len(LEARNERS)), yticklabels=[],
         )  # fmt: skip
         axis.axvline(Task().silent_score, color="0.5", linestyle=":", linewidth=0.8)
-    np.atleast_1d(axes)[0].set_yticklabels(LEARNERS, fontsize=7)
+    axes[0, 0].set_yticklabels(LEARNERS, fontsize=7)
     return figure
 
 

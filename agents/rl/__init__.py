@@ -1,4 +1,4 @@
-"""Reinforcement learning on the same stream: recipes over Stable-Baselines3, and their scoring.
+"""Reinforcement learning on the same stream: Stable-Baselines3's algorithms, and their scoring.
 
 Needs torch, Stable-Baselines3 and sb3-contrib: `pip install -e ".[rl]"`.
 """
@@ -13,20 +13,25 @@ except ImportError as error:
         'pip install -e ".[rl]"'
     ) from error
 
-from agents.rl.folder import load, save
-from agents.rl.recipes import RECIPES, Recipe, make_rl_agent, training_env
+from agents.rl.checkpoint import load, save
+from agents.rl.hyperparameters import (
+    HYPERPARAMETERS,
+    Hyperparameters,
+    make_rl_agent,
+    training_env,
+)
+from agents.rl.observation import RAW, TRACES, ObservationConfig
 from agents.rl.sb3_agent import SB3Agent
-from agents.rl.senses import RAW, TRACES, Senses
 from agents.rl.vec_env import PatternVecEnv
 
 __all__ = [
+    "HYPERPARAMETERS",
     "RAW",
-    "RECIPES",
     "TRACES",
+    "Hyperparameters",
+    "ObservationConfig",
     "PatternVecEnv",
-    "Recipe",
     "SB3Agent",
-    "Senses",
     "load",
     "make_rl_agent",
     "save",

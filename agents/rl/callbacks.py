@@ -12,8 +12,8 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.rl.folder import BEST, MODEL, save_model
-from agents.rl.senses import Senses
+from agents.rl.checkpoint import BEST, MODEL, save_model
+from agents.rl.observation import ObservationConfig
 from agents.rl.vec_env import PatternVecEnv
 from gnm_env.task import Patterns, Task
 
@@ -29,7 +29,7 @@ class Evaluation(EvalCallback):
 
     Args:
         folder: of the saved agent.
-        task, patterns, senses: what is heard, and how.
+        task, patterns, observation: what is heard, and how.
         every: calls (steps of all environments) between evaluations.
         seed: of the streams, which go on from one evaluation to the next.
 
@@ -42,7 +42,7 @@ class Evaluation(EvalCallback):
         folder: str | os.PathLike[str],
         task: Task,
         patterns: Patterns,
-        senses: Senses,
+        observation: ObservationConfig,
         *,
         every: int,
         seed: int,
@@ -55,7 +55,7 @@ class Evaluation(EvalCallback):
             patterns=patterns,
             autoreset_mode=gym.vector.AutoresetMode.SAME_STEP,
         )
-        env = VecMonitor(PatternVecEnv(senses.wrap(streams)))
+        env = VecMonitor(PatternVecEnv(observation.wrap(streams)))
         env.seed(seed)
         place = Path(folder)
         super().__init__(

@@ -210,6 +210,15 @@ class Agent:
         put("rule_memory", values, self._rule_memory)
 
     @property
+    def potential(self) -> float:
+        """Membrane potential in the last bin that `act` heard, before any reset; 0 before the first.
+
+        Divided by `model.threshold` it is what an environment's `potential` takes for its pictures.
+        """
+        assert self._heard is not None
+        return float(self._heard.V[self._bin - 1, 0]) if self._bin else 0.0
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest weight; infinite where there is no bound."""
         return self._weight_bounds or (-np.inf, np.inf)
@@ -416,8 +425,7 @@ class Agent:
 
     def _checked(self, obs: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.int8]:
         """`obs` as contiguous bits of this shape."""
-        if type(obs) is not np.ndarray or obs.dtype != np.int8 or not obs.flags.c_contiguous:
-            obs = _bits(obs)
+        obs = bits_of(obs)
         if obs.shape != shape:
             raise ValueError(
                 f"an observation must have shape {shape} (n_inputs = {self._n_inputs}), "
@@ -562,8 +570,10 @@ def _require_numbers(model: Model) -> None:
         )
 
 
-def _bits(obs: Any) -> NDArray[np.int8]:
-    """Observations of another type as int8; ValueError unless they are 0 and 1."""
+def bits_of(obs: Any) -> NDArray[np.int8]:
+    """Observations as contiguous int8; ValueError unless they are 0 and 1 (int8 is believed)."""
+    if type(obs) is np.ndarray and obs.dtype == np.int8 and obs.flags.c_contiguous:
+        return obs
     array = _array(obs)
     if array.dtype.kind not in "fiub" or not np.isin(array, (0, 1)).all():
         raise ValueError(

@@ -105,14 +105,15 @@ def _loops(key: Key) -> Any:
     everything["new_log"] = specialise(new_log_template, together, inline=True, **of_rule)
     if key.rule.weigh is not None:
         everything["weighed"] = specialise(weighed_template, together, **of_rule)
-    made = SimpleNamespace()
+    explore_bin = None
     if key.rule.explore is not None:
         names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
         everything["explore_trial"] = specialise(
             explore_trial_template, together, inline=True, **names
         )
-        made.explore_bin = specialise(explore_bin_template, together, **names)
-    made.__dict__.update(
+        explore_bin = specialise(explore_bin_template, together, **names)
+    return SimpleNamespace(
+        explore_bin=explore_bin,
         train=specialise(train_template, together, **everything),
         answer=specialise(answer_template, together, **everything),
         update=specialise(update_template, together, **everything),
@@ -120,7 +121,6 @@ def _loops(key: Key) -> Any:
         step=specialise(step_template, alone, **of_model),
         predict=specialise(predict_template, alone, **of_model),
     )
-    return made
 
 
 def _of_model(advance: Any, model: type[Model], width: int) -> dict[str, Any]:

@@ -106,6 +106,14 @@ class PatternStreamEnv(PatternEnv):
         self._ahead = list(self._raster[::-1])
         self._count = 0
 
+    @property
+    def presented(self) -> int:
+        """The class, from 0, of the pattern that the bin shown last belongs to; −1 in noise.
+
+        For pictures only: an agent that looks at it has nothing left to learn.
+        """
+        return -1 if self._in_noise() else self._class
+
     def _in_noise(self) -> bool:
         """Whether the bin shown last is noise."""
         return len(self._ahead) >= self._pattern_bins

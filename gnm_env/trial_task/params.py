@@ -39,6 +39,11 @@ class TrialEnvParams(EnvParams):
         self._put("output", choice("output", self.output, OUTPUT))
         self._put("max_output", real("max_output", self.max_output, above=0.0))
         self._put("tolerance", real("tolerance", self.tolerance, low=0.0))
+        if self.tolerance > 0.0 and not self.graded:
+            raise ValueError(
+                f"tolerance belongs to output='graded', got {self.tolerance:g} with "
+                "output='spikes': leave it out"
+            )
         super().__post_init__()
 
     def _resolve(self) -> None:

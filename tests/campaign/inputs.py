@@ -192,7 +192,7 @@ class ForeignTraceback(Exception):
 
 
 def cases() -> list[Case]:
-    """All bad inputs, some 1,200, in a fixed order."""
+    """All bad inputs, some 3,200, in a fixed order."""
     made = [
         *_parameters(), *_task_and_patterns(), *_trials(), *_environments(), *_steps(),
         *_wrappers(), *_agents(), *_learning(), *_predict(), *_running(), *_files(), *_rl(),
@@ -896,10 +896,13 @@ def _learning() -> list[Case]:
         made += _of(own, f"a = {one}\na.begin_trial()\na.learn(-1.0, «»)", ["info()"])
         made += _of(own, f"a = {one}\na.act(«»)\na.learn(-1.0, info())", ["np.ones(4, np.int8)"])
         made += _of(own, make + "for _ in range(3): a.learn(«», info())", ["-1.0"])
-    # A rule that only asks how much was owed does not look at where.
+    # A rule that only asks how much was owed needs no more than the label, which may be any.
+    alone = ("learn(-1.0, {'label': 1})", "learn(-1.0, info(label=-1))")
     made = [
         dataclasses.replace(
-            c, fine="heard(agent())" in c.code and "info(" in c.code and "label=" not in c.code
+            c,
+            fine="heard(agent())" in c.code
+            and (c.code.endswith(alone) or ("info(" in c.code and "label=" not in c.code)),
         )
         for c in made
     ]
@@ -1064,7 +1067,7 @@ def _running() -> list[Case]:
         own, score.replace("seed=1", "seed=1, threads=«»"), ["0", "-1", "'x'", "2.5", "10**30"]
     )
     made += _of(own, score.replace("seed=1", "seed=1, shared=«»"), BOOL)
-    made += _of(own, "answers(agent(), task, patterns, trials=«»)", [*WHOLE, "0"])
+    made += _of(own, "answers(agent(), task, patterns, trials=«»)", [*WHOLE[1:], "0"])
     made += _of(own, "answers(agent(), task, patterns, trials=2, seed=«»)", SEED)
     made += _of(
         own, "answers(«», task, patterns, trials=2)", ["None", "[]", "3", "'x'", "[agent(), 3]"]
@@ -1258,8 +1261,7 @@ def _rl() -> list[Case]:
     made: list[Case] = []
     own = "agents/rl/sb3_agent.py"
     head = (
-        "from agents.rl.sb3_agent import SB3Agent\nfrom agents.rl import senses\n"
-        "Senses = getattr(senses, 'Senses', None) or senses.ObservationConfig\n"
+        "from agents.rl import ObservationConfig, SB3Agent\n"
         "class P:\n    def predict(self, o, s=None, e=None, d=True): return np.zeros(len(o), int), s\n"
     )
 
@@ -1309,7 +1311,7 @@ def _rl() -> list[Case]:
             "rising_edge=None",
             "bogus=1",
         ],
-        "Senses(«»)",
+        "ObservationConfig(«»)",
     )
     return _fine(made, "np.zeros(4, object)", "P(), task, None", "predict(np.zeros((1, 4)))")
 

@@ -60,12 +60,15 @@ def test_traces_follow_the_recursion_and_are_scaled_by_their_standard_deviation(
         np.testing.assert_allclose(traces[t], (0.5 * x / deviation[:, None]).ravel(), rtol=1e-5)
 
 
-def test_a_trace_of_noise_has_unit_variance():
-    env = SynapticTrace(gym.make(STREAM, onset_probability=0.0, rate=0.02), decays=(0.3, 1.0))
-    traces = play(env, np.zeros(3000, np.int64))[50:]
+@pytest.mark.parametrize(("arguments", "scale"), [({}, 1 / 3), ({"scale": 1.0}, 1.0)], ids=str)
+def test_a_trace_of_noise_has_the_standard_deviation_that_scale_says(arguments, scale):
+    bare = gym.make(STREAM, onset_probability=0.0, rate=0.02)
+    traces = play(SynapticTrace(bare, decays=(0.3, 1.0), **arguments), np.zeros(3000, np.int64))[
+        50:
+    ]
     # 300,000 correlated values in each half; the estimate's own spread is about 1 %.
-    assert traces[:, :100].var() == pytest.approx(1.0, abs=0.1)
-    assert traces[:, 100:].var() == pytest.approx(1.0, abs=0.1)
+    assert traces[:, :100].var() == pytest.approx(scale**2, rel=0.1)
+    assert traces[:, 100:].var() == pytest.approx(scale**2, rel=0.1)
 
 
 def test_previous_action_and_own_spike_trace_follow_the_inputs():

@@ -31,7 +31,7 @@ class Entry(NamedTuple):
 
 def entry(made: Rule, oracle: Callable[..., Lesson], **options: Any) -> Entry:
     """A rule that takes the oracle's options by the same names."""
-    made = type(made)(learning_rate=LAMBDA, **options)
+    made = type(made)(learning_rate=LAMBDA, momentum=0.2, **options)
     return Entry(made, partial(oracle, learning_rate=LAMBDA, **options), made.name == "tempotron")
 
 

@@ -13,7 +13,7 @@ import torch
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from agents import noisy_performance
-from agents.rl import RECIPES, SB3Agent, make_rl_agent, training_env
+from agents.rl import HYPERPARAMETERS, SB3Agent, make_rl_agent, training_env
 from gnm_env import Patterns, Task
 
 TASK = Task()
@@ -38,7 +38,7 @@ def score(env: VecEnv) -> float:
     torch.set_num_threads(1)
     model = make_rl_agent("ppo", env, seed=0)
     model.learn(1_200_000)
-    agent = SB3Agent(model, TASK, RECIPES["ppo"].senses)
+    agent = SB3Agent(model, TASK, HYPERPARAMETERS["ppo"].observation)
     return float(noisy_performance(agent, TASK, PATTERNS, runs=50, seed=500).mean())
 
 

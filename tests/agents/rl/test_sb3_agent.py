@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -16,7 +17,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, train_many
 from agents.policy import PolicyBatch
-from agents.rl import RAW, TRACES, SB3Agent, Senses, make_rl_agent
+from agents.rl import RAW, TRACES, ObservationConfig, SB3Agent, make_rl_agent
 from agents.training.source import TaskSource
 from gnm_env import Patterns, Task
 from gnm_env.wrappers import SeededEpisodes
@@ -80,10 +81,12 @@ def test_a_neuron_scores_the_same_in_evaluate_policy_as_in_noisy_performance():
 
 
 def test_a_model_trained_on_wrapped_environments_is_shown_the_same_by_the_agent():
-    senses = Senses(decays=(0.3, 0.1), previous_action=True, own_decay=0.2, rising_edge=True)
+    config = ObservationConfig(
+        decays=(0.3, 0.1), previous_action=True, own_decay=0.2, rising_edge=True
+    )
     recorder = Recorder()
-    agent = SB3Agent(recorder, TASK, senses)
-    wrapped, bare = senses.wrap(trial_env()), trial_env()
+    agent = SB3Agent(recorder, TASK, config)
+    wrapped, bare = config.wrap(trial_env()), trial_env()
     observation, _ = wrapped.reset(seed=2)
     bits, _ = bare.reset(seed=2)
     agent.begin_trial()
@@ -128,12 +131,68 @@ def test_predict_changes_nothing():
         np.testing.assert_array_equal(part, copy)
 
 
-def test_senses_that_a_policy_was_not_trained_with_are_refused():
+def test_observations_that_a_policy_was_not_trained_on_are_refused():
     model = make_rl_agent("ppo", trial_env())
-    with pytest.raises(ValueError, match=r"shape \(102,\), these senses show \(100,\)"):
+    with pytest.raises(ValueError, match="the policy was trained on ObservationConfig"):
         SB3Agent(model, TASK, RAW)
-    with pytest.raises(ValueError, match="decays is empty"):
-        Senses(previous_action=True)
+    del model.observation_config  # a model of one's own: its space tells
+    with pytest.raises(ValueError, match=r"shape \(102,\), .* shows \(100,\)"):
+        SB3Agent(model, TASK, RAW)
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["by its config", "by its space"])
+@pytest.mark.parametrize("other", [{"scale": 1.0}, {"decays": (0.2,)}, {"own_decay": 0.2}], ids=str)
+def test_a_policy_trained_at_another_scale_or_decay_is_refused(
+    told: bool, other: dict[str, Any]
+) -> None:
+    """The shapes are the same, and the score would be that of silence."""
+    model = make_rl_agent("ppo", trial_env())
+    if not told:
+        del model.observation_config
+    with pytest.raises(ValueError, match="the policy was trained on"):
+        SB3Agent(model, TASK, replace(TRACES, **other))
+    assert SB3Agent(model, TASK, TRACES).observation == TRACES
+
+
+def test_a_policy_that_says_what_it_was_trained_on_need_not_be_told() -> None:
+    assert SB3Agent(make_rl_agent("ppo", trial_env()), TASK).observation == TRACES
+    assert SB3Agent(make_rl_agent("recurrent-ppo", trial_env()), TASK).observation == RAW
+    assert SB3Agent(Recorder(), TASK).observation == RAW
+
+
+@pytest.mark.parametrize("policy", [None, 3, "x", object(), Recorder], ids=str)
+def test_what_cannot_predict_is_no_policy(policy: Any) -> None:
+    with pytest.raises(ValueError, match="policy must be an SB3 model, or anything with its"):
+        SB3Agent(policy, TASK)
+
+
+@pytest.mark.parametrize("task", [None, 3, {}, PATTERNS], ids=str)
+def test_a_policy_needs_the_task_that_it_was_trained_on(task: Any) -> None:
+    with pytest.raises(ValueError, match=r"task must be the gnm_env.Task"):
+        SB3Agent(Recorder(), task)
+
+
+@pytest.mark.parametrize("config", [3, "x", {"bogus": 1}])
+def test_what_is_shown_must_be_an_observation_config(config: Any) -> None:
+    with pytest.raises(ValueError, match="an observation config must be an ObservationConfig"):
+        SB3Agent(Recorder(), TASK, config)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((np.full(100, 0.5),), "an observation must hold the bits of a bin"),
+        ((["a"] * 100,), "an observation must hold the bits of a bin"),
+        (([[0], [1, 0]],), "an observation must hold the bits of a bin"),
+        ((np.zeros((2, 100), np.int8), 3), "state must be what predict returned, or None"),
+        ((np.zeros((2, 100), np.int8), (1, 2, 3)), "state must be what predict returned, or None"),
+        ((np.zeros((2, 100), np.int8), None, [True]), "episode_start must have shape"),
+        ((np.zeros((2, 100), np.int8), None, "x"), "episode_start must be True or False"),
+    ],
+)
+def test_predict_refuses_what_it_cannot_answer(arguments: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        SB3Agent(Recorder(), TASK, TRACES).predict(*arguments)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,8 @@ def test_an_autoreset_mode_may_be_given_by_its_value(given: Any) -> None:
         {"pattern_seed": "x"}, {"pattern_seed": -1}, {"pattern_seed": 2**200},
         {"pattern_seed": None}, {"render_mode": "ascii"}, {"render_mode": ["human"]},
         {"feedback": "costs"}, {"feedback": ["cost"]}, {"output": None}, {"max_output": "x"},
-        {"max_output": float("inf")}, {"tolerance": float("nan")}, {"trials": []},
+        {"max_output": float("inf")}, {"tolerance": float("nan")}, {"tolerance": 0.5},
+        {"trials": []},
     ],
     ids=str,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The recipes: a start near silence, SB3's own objects, refusals that say what to do."""
+"""The hyperparameters: a start near silence, SB3's own objects, refusals that say what to do."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import DQN, PPO
 
-from agents.rl import RECIPES, TRACES, make_rl_agent, training_env
-from agents.rl.recipes import n_parameters
+from agents.rl import HYPERPARAMETERS, TRACES, make_rl_agent, training_env
+from agents.rl.hyperparameters import n_parameters
 from gnm_env import Patterns, Task
 
 TASK = Task()
@@ -21,7 +21,7 @@ PATTERNS = Patterns.draw(TASK, 0)
 CLASSES = {"ppo": PPO, "ppo-linear": PPO, "recurrent-ppo": RecurrentPPO, "dqn": DQN}
 
 
-@pytest.mark.parametrize("kind", RECIPES)
+@pytest.mark.parametrize("kind", HYPERPARAMETERS)
 def test_an_agent_is_a_plain_model_of_stable_baselines(kind):
     model = make_rl_agent(kind, training_env(TASK, PATTERNS, kind, n_envs=2))
     assert type(model) is CLASSES[kind]
@@ -44,7 +44,7 @@ def test_a_fresh_dqn_is_silent():
     assert not model.predict(env.reset(), deterministic=True)[0].any()
 
 
-def test_equal_seeds_begin_equal_and_settings_override_the_recipe():
+def test_equal_seeds_begin_equal_and_settings_override_those_of_the_kind():
     first, second, other = (
         make_rl_agent("ppo", training_env(TASK, PATTERNS, n_envs=2), seed, gamma=0.9)
         for seed in (1, 1, 2)
@@ -107,6 +107,6 @@ def test_the_target_network_of_a_dqn_does_not_count():
     assert n_parameters(model) == 102 * 64 + 64 + 64 * 64 + 64 + 64 * 2 + 2
 
 
-def test_every_recipe_gives_its_reasons():
-    for kind in RECIPES:
+def test_every_kind_gives_its_reasons():
+    for kind in HYPERPARAMETERS:
         assert f'- "{kind}": ' in (make_rl_agent.__doc__ or "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,17 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3 import PPO
 
 from agents import noisy_performance
-from agents.rl import TRACES, SB3Agent, load, make_rl_agent, save, training_env
+from agents.rl import (
+    RAW,
+    TRACES,
+    ObservationConfig,
+    SB3Agent,
+    load,
+    make_rl_agent,
+    save,
+    training_env,
+)
+from agents.rl.checkpoint import described
 from gnm_env import Patterns, Task
 
 TASK = Task(n_classes=2, onset_probability=0.05)
@@ -112,3 +123,30 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path, model):
     (tmp_path / "file").write_text("")
     with pytest.raises(ValueError, match="cannot make the folder"):
         save(tmp_path / "file" / "agent", model, "ppo", TASK, PATTERNS)
+
+
+def test_what_the_policy_hears_is_kept_in_the_zip_and_beside_it(folder, model):
+    about = json.loads((folder / "task.json").read_text())
+    assert ObservationConfig.of(about["observation"]) == TRACES
+    assert ObservationConfig.of(PPO.load(folder / "model.zip").observation_config) == TRACES
+
+
+def test_a_policy_is_not_scored_on_other_observations_than_its_own(folder, tmp_path, model):
+    about = json.loads((folder / "task.json").read_text())
+    about["observation"]["scale"] = 1.0
+    (folder / "task.json").write_text(json.dumps(about))
+    with pytest.raises(ValueError, match="the policy was trained on ObservationConfig"):
+        load(folder)
+    with pytest.raises(ValueError, match="the policy was trained on ObservationConfig"):
+        save(tmp_path / "b", model, "ppo", TASK, PATTERNS, observation=replace(TRACES, scale=1.0))
+    assert not (tmp_path / "b").exists()
+
+
+def test_a_folder_of_the_first_format_is_read(folder):
+    about = json.loads((folder / "task.json").read_text())
+    about["format"], about["senses"] = 1, about.pop("observation")
+    (folder / "task.json").write_text(json.dumps(about))
+    assert load(folder)[0].observation == TRACES
+    about |= {"kind": "recurrent-ppo", "senses": asdict(RAW) | {"scale": 1.0}}
+    (folder / "task.json").write_text(json.dumps(about))
+    assert described(folder).observation == RAW  # raw bits have no scale

@@ -1,4 +1,4 @@
-"""Recipes: Stable-Baselines3's algorithms, each with the settings that this task needs.
+"""Hyperparameters: Stable-Baselines3's algorithms, each with the settings that this task needs.
 
 Nothing here is an algorithm. `make_rl_agent` calls SB3's constructor and gives the last layer a
 start near silence; the result is a plain SB3 model with its `learn`, `save` and `predict`.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -21,27 +21,27 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
-from agents.rl.senses import RAW, TRACES, Senses
+from agents.rl.observation import RAW, TRACES, ObservationConfig
 from agents.rl.vec_env import PatternVecEnv
 from gnm_env.checks import choice, real, whole
 from gnm_env.task import Patterns, Task
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """One kind of agent.
+class Hyperparameters:
+    """Those of one kind of agent.
 
     Attributes:
         algorithm: SB3's class.
         policy: SB3's name of the policy.
-        senses: what the policy is shown.
+        observation: what the policy is shown.
         n_envs: environments side by side.
         settings: keywords of the algorithm, for a number of environments.
     """
 
     algorithm: type[BaseAlgorithm]
     policy: str
-    senses: Senses
+    observation: ObservationConfig
     n_envs: int
     settings: Callable[[int], dict[str, Any]]
 
@@ -112,11 +112,11 @@ def _dqn(n_envs: int) -> dict[str, Any]:
     }
 
 
-RECIPES: dict[str, Recipe] = {
-    "ppo": Recipe(PPO, "MlpPolicy", TRACES, 64, _ppo),
-    "ppo-linear": Recipe(PPO, "MlpPolicy", TRACES, 64, _linear),
-    "recurrent-ppo": Recipe(RecurrentPPO, "MlpLstmPolicy", RAW, 256, _recurrent),
-    "dqn": Recipe(DQN, "MlpPolicy", TRACES, 16, _dqn),
+HYPERPARAMETERS: dict[str, Hyperparameters] = {
+    "ppo": Hyperparameters(PPO, "MlpPolicy", TRACES, 64, _ppo),
+    "ppo-linear": Hyperparameters(PPO, "MlpPolicy", TRACES, 64, _linear),
+    "recurrent-ppo": Hyperparameters(RecurrentPPO, "MlpLstmPolicy", RAW, 256, _recurrent),
+    "dqn": Hyperparameters(DQN, "MlpPolicy", TRACES, 16, _dqn),
 }
 
 
@@ -132,12 +132,12 @@ def training_env(
 
     Args:
         task, patterns: the world.
-        kind: a key of `RECIPES`.
+        kind: a key of `HYPERPARAMETERS`.
         feedback: "cost" or "dense", see `PatternTrialEnv`.
-        n_envs: their number; None: the recipe's.
+        n_envs: their number; None: the kind's.
     """
-    recipe = RECIPES[choice("kind", kind, tuple(RECIPES))]
-    n_envs = recipe.n_envs if n_envs is None else whole("n_envs", n_envs, low=1)
+    chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
+    n_envs = chosen.n_envs if n_envs is None else whole("n_envs", n_envs, low=1)
     envs = gym.make_vec(
         "gnm/PatternTrial-v0",
         num_envs=n_envs,
@@ -147,7 +147,7 @@ def training_env(
         feedback=feedback,
         autoreset_mode=gym.vector.AutoresetMode.SAME_STEP,
     )
-    return VecMonitor(PatternVecEnv(recipe.senses.wrap(envs)))
+    return VecMonitor(PatternVecEnv(chosen.observation.wrap(envs)))
 
 
 def make_rl_agent(
@@ -186,36 +186,38 @@ def make_rl_agent(
       spikes so far, which no trace tells: the values of an observation then are not defined.
 
     Args:
-        kind: a key of `RECIPES`.
+        kind: a key of `HYPERPARAMETERS`.
         env: `training_env(…)`, or a `gnm/PatternTrial-v0` from `gym.make`, which is wrapped here.
         seed: of the initial weights, of exploration and of the stream.
         spike_probability: at the start, per bin, between 0 and 1. Not for DQN, which begins with
             10,000 random answers to fill its buffer and then prefers silence.
-        settings: keywords of SB3's class, which override the recipe's.
+        settings: keywords of SB3's class, which override the kind's.
 
     Raises:
         ValueError: an unknown kind, a probability outside (0, 1), or an environment that does not
             show what this kind needs or takes amounts for actions.
     """
-    recipe = RECIPES[choice("kind", kind, tuple(RECIPES))]
+    chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
     p = real("spike_probability", spike_probability, 0.0, 1.0, above=0.0)
     if p == 1.0:
         raise ValueError("spike_probability must be < 1, got 1.0")
     if isinstance(env, gym.Env):
         if env.observation_space.dtype != np.int8:
             raise ValueError(
-                f"{kind} puts its own senses around an environment of raw bits, and this one shows "
-                f"{env.observation_space}: give it unwrapped"
+                f"{kind} shows its own observations of an environment of raw bits, and this one "
+                f"gives {env.observation_space}: give it unwrapped"
             )
         _require_spikes(env.action_space)
-        env = recipe.senses.wrap(env)
+        env = chosen.observation.wrap(env)
     else:
-        _require_senses(env, recipe.senses, kind)
+        _require_observation(env, chosen.observation, kind)
         _require_spikes(env.action_space)
     n_envs = env.num_envs if isinstance(env, VecEnv) else 1
-    keywords = {**recipe.settings(n_envs), "device": "cpu", **settings}
-    model = recipe.algorithm(recipe.policy, env, seed=whole("seed", seed, low=0), **keywords)
+    keywords = {**chosen.settings(n_envs), "device": "cpu", **settings}
+    model = chosen.algorithm(chosen.policy, env, seed=whole("seed", seed, low=0), **keywords)
     _begin_near_silence(model, p)
+    # SB3 keeps it in the model's zip; SB3Agent compares it.
+    model.observation_config = asdict(chosen.observation)  # type: ignore[attr-defined]
     return model
 
 
@@ -226,15 +228,15 @@ def n_parameters(model: BaseAlgorithm) -> int:
     return sum(p.numel() for p in trained.parameters() if p.requires_grad)
 
 
-def _require_senses(env: Any, senses: Senses, kind: str) -> None:
+def _require_observation(env: Any, observation: ObservationConfig, kind: str) -> None:
     if not isinstance(env, VecEnv):
         hint = "; training_env makes one" if isinstance(env, VectorEnv) else ""
         raise ValueError(
             f"env must be a Gymnasium Env or an SB3 VecEnv, got {type(env).__name__}{hint}"
         )
-    if bool(senses.decays) != np.issubdtype(env.observation_space.dtype, np.floating):
+    if observation.raw_bits == np.issubdtype(env.observation_space.dtype, np.floating):
         raise ValueError(
-            f"{kind} needs {'traces' if senses.decays else 'the raw bits'} as observations, "
+            f"{kind} needs {'the raw bits' if observation.raw_bits else 'traces'} as observations, "
             f"got {env.observation_space}; training_env(task, patterns, {kind!r}) gives them"
         )
 
