@@ -118,7 +118,7 @@ class Learner:
 
     def agent(self, n_inputs: int, seed: int, trials: int) -> NeuronAgent:
         """A new agent, to be trained on so many trials."""
-        rule = registry.rules()[self.rule](**self.settings, decay_trials=trials)  # type: ignore[call-arg]
+        rule = registry.rules()[self.rule](**self.settings, decay_trials=trials)
         return NeuronAgent(self.neuron, rule, n_inputs, seed, self.initial_weight, self.bounds)
 
 

@@ -12,7 +12,7 @@ nothing more. Which words were said, when and in which voice stays beside the tr
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,7 @@ def say(phrase: Phrase, voice: str, word: int = WORD) -> tuple[Trial, list[int],
 
 
 def make(
-    voices: dict[str, Sequence[str]],
+    voices: Mapping[str, Sequence[str]],
     sizes: dict[str, int],
     *,
     word: int = WORD,
