@@ -120,7 +120,6 @@ def test_keys_move_sliders_and_wrong_values_are_told(page: Any, address: str) ->
 
 def test_presets_fill_in_the_page_and_stand_beside_each_other(page: Any, address: str) -> None:
     visit(page, f"{address}?{FEW}")
-    page.evaluate("document.getElementById('notice').textContent = ''")
     page.select_option("#presets", label="Above threshold for ever")
     playwright.expect(page.locator("#status")).to_contain_text("stays above", timeout=MINUTES)
     assert "upward crossing" in page.text_content("#notice").replace("\n", " ")
