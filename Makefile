@@ -30,7 +30,7 @@ show: $(VENV)/.for-train  ## draw how a neuron works: hysteresis, response to ea
 	@$(RUN) scripts/show.py $(ARGS)
 
 explore: $(VENV)/.for-explore  ## move sliders in the browser, see a neuron learn anew
-	@$(RUN) -m agents.commands explore $(ARGS)
+	@$(RUN) scripts/explore.py $(ARGS)
 
 test: $(VENV)/.for-test  ## formatter, linter, type checker and all fast tests
 	$(RUN) -m ruff format --check .

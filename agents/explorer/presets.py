@@ -30,9 +30,9 @@ PRESETS = (
     Preset(
         "The cliff at small α",
         "At α = 0.05 the neuron remembers too long to tell a pattern from noise. Drag α slowly up "
-        "to 0.2: within a few hundredths the score jumps from near silence to the cap.",
+        "to 0.3: the score climbs from that of silence to near the cap (dashed).",
         "n.alpha=0.05",
-        "n.alpha=0.2",
+        "n.alpha=0.3",
     ),
     Preset(
         "Silent for ever",
@@ -56,10 +56,10 @@ PRESETS = (
     ),
     Preset(
         "Error trace against aggregate label",
-        "Who is told where the error was learns two classes better than who is told its sign at "
-        "the end (dashed).",
-        "rule=et&r.modulate=1&t.n_classes=2",
-        "t.n_classes=2",
+        "On these patterns, as on most, who is told where the error was learns two classes better "
+        "than who is told its sign at the end (dashed). Move the pattern seed: not on all.",
+        "rule=et&r.modulate=1&t.n_classes=2&pattern_seed=2",
+        "t.n_classes=2&pattern_seed=2",
     ),
     Preset(
         "Critical threshold against ALL",

@@ -428,7 +428,7 @@ function wire() {
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   window.addEventListener("popstate", () => { readAddress(); rebuild(); run(); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  new ResizeObserver(draw).observe($("results"));
+  new ResizeObserver(draw).observe($("trial-figure"));
 }
 
 function theme(name) {
