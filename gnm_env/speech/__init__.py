@@ -1,7 +1,8 @@
 """Speech as trials: phrases of spoken digits, and how sound becomes spikes.
 
-`digits()` are phrases that ship with the project; `trial_of(*read_wav(path), label)` makes a trial of
-a recording of yours. New phrases are synthesised by eSpeak NG, which the extra `speech` installs.
+`digits()` are phrases that ship with the project; `trial_of(*read_wav(path), label)` makes a trial
+of a recording of yours. New phrases are synthesised by eSpeak NG, which the extra `speech`
+installs.
 """
 
 from gnm_env.speech.encoder import CHANNELS, centres, encode, envelopes, read_wav

@@ -1,6 +1,6 @@
-"""Sound into spikes: gammatone bands, their log envelopes, and the times at which these cross levels.
+"""Sound into spikes: gammatone bands, their log envelopes, and when these cross levels.
 
-    signal ─ 24 gammatone bands ─ power in windows of 10 ms ─ dB below the band's loudest ─ crossings
+    sound ─ 24 gammatone bands ─ power in windows of 10 ms ─ dB below the band's loudest ─ crossings
 
 Each band has two levels and each level two channels, one for the envelope rising through it and one
 for it falling: 96 channels, about 150 spikes for a spoken word.

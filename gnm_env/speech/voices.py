@@ -1,8 +1,8 @@
 """Voices, how far they are from one another, and a split that holds out distant ones.
 
-Many of eSpeak's voices are near copies of each other. Who holds out voices at random tests on voices
-that were as good as heard. Here a voice is *near* another if what the encoder makes of their digits
-differs by less than a bound, and no training voice may be near a test voice.
+Many of eSpeak's voices are near copies of each other. Who holds out voices at random tests on
+voices that were as good as heard. Here a voice is *near* another if what the encoder makes of their
+digits differs by less than a bound, and no training voice may be near a test voice.
 """
 
 from __future__ import annotations
