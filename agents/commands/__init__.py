@@ -33,6 +33,7 @@ VERBS = {
     "report": "judge the paper's claims and write the report",
     "reference-table": "print every neuron and rule on one to four classes",
     "league": "neurons, network and RL agents in one table",
+    "speech": "hear a word in speech, told only how often it was said",
     "chemistry": "a trained continuous neuron as a chemical reaction network",
     "publish": "keep a finished report in docs/reproduction",
     "check-report": "open the report in headless Chromium and look for errors",

@@ -23,6 +23,7 @@ EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "sb3_contrib", "tensorboard"), "rl"),
     **dict.fromkeys(("roadrunner", "libsbml", "antimony"), "chemistry"),
     **dict.fromkeys(("dask", "distributed"), "cluster"),
+    "espeakng_loader": "speech",
     "matplotlib": "pictures",
     "tornado": "explore",
     **dict.fromkeys(("PIL", "imageio_ffmpeg"), "video"),

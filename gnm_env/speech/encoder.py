@@ -1,6 +1,6 @@
 """Sound into spikes: gammatone bands, their log envelopes, and when these cross levels.
 
-    signal ─ 24 gammatone bands ─ power in windows of 10 ms ─ dB below the loudest ─ crossings
+    sound ─ 24 gammatone bands ─ power in windows of 10 ms ─ dB below the band's loudest ─ crossings
 
 Each band has two levels and each level two channels, one for the envelope rising through it and one
 for it falling: 96 channels, about 150 spikes for a spoken word.
@@ -11,7 +11,6 @@ from __future__ import annotations
 import functools
 import wave
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,7 +81,7 @@ def encode(sound: ArrayLike, rate: float) -> list[NDArray[np.float64]]:
     trial of them.
     """
     envelope = envelopes(sound, rate)
-    times: list[Any] = []
+    times = []
     for band in range(BANDS):
         for level in LEVELS:
             above = (envelope[:, band] >= level).astype(np.int8)
@@ -102,7 +101,7 @@ def read_wav(path: str | Path) -> tuple[NDArray[np.float64], int]:
             raw = file.readframes(file.getnframes())
     except (OSError, EOFError, wave.Error) as error:
         raise ValueError(f"cannot read {path} as a wav file: {error}") from None
-    kinds: dict[int, Any] = {1: np.dtype("u1"), 2: np.dtype("<i2"), 4: np.dtype("<i4")}
+    kinds = {1: np.dtype("u1"), 2: np.dtype("<i2"), 4: np.dtype("<i4")}
     if width not in kinds:
         raise ValueError(
             f"a wav file must have 8, 16 or 32 bits a sample, got {8 * width}: convert {path}"

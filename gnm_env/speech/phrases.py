@@ -149,7 +149,7 @@ def make(
     return Trials(trials, columns=columns, metadata=known)
 
 
-SIZES = {"train": 5_000, "test": 2_000, "near": 400, "stream": 60}
+SIZES = {"train": 5_000, "test": 2_000, "near": 400, "stream": 40}
 """Phrases of each split."""
 VOICES, BOUND = 10, 0.16
 """Test voices, and as many of the control; how far a training voice must be from a test voice."""
