@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import wave
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,7 +82,7 @@ def encode(sound: ArrayLike, rate: float) -> list[NDArray[np.float64]]:
     trial of them.
     """
     envelope = envelopes(sound, rate)
-    times = []
+    times: list[Any] = []
     for band in range(BANDS):
         for level in LEVELS:
             above = (envelope[:, band] >= level).astype(np.int8)
@@ -101,7 +102,7 @@ def read_wav(path: str | Path) -> tuple[NDArray[np.float64], int]:
             raw = file.readframes(file.getnframes())
     except (OSError, EOFError, wave.Error) as error:
         raise ValueError(f"cannot read {path} as a wav file: {error}") from None
-    kinds = {1: np.dtype("u1"), 2: np.dtype("<i2"), 4: np.dtype("<i4")}
+    kinds: dict[int, Any] = {1: np.dtype("u1"), 2: np.dtype("<i2"), 4: np.dtype("<i4")}
     if width not in kinds:
         raise ValueError(
             f"a wav file must have 8, 16 or 32 bits a sample, got {8 * width}: convert {path}"
