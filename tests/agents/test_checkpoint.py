@@ -302,7 +302,7 @@ def rewritten(path: Path, arrays: dict[str, Any] | None = None, **header: Any) -
         ({}, {"format": None}, "format"),
         ({}, {"agent": {"name": "oracle", "class": "delphi:Oracle"}}, "import delphi first"),
         ({}, {"model": {"name": "izhikevich", "parameters": {}}}, "izhikevich"),
-        ({}, {"model": {"name": "alif", "class": "my.own:ALIF"}}, "import my.own first"),
+        ({}, {"model": {"name": "nobodys", "class": "my.own:Nobodys"}}, "import my.own first"),
         ({}, {"model": {"name": "gnm", "parameters": {"alpha": 7.0}}}, "alpha must be in 0 … 1"),
         ({}, {"model": {"name": "gnm", "parameters": {"omega": 7.0}}}, "omega"),
         ({}, {"rule": None}, "rule"),

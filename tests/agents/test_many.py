@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -181,6 +182,15 @@ class FakeAgent:
         return Batch()
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Processes that run tests side by side ignore interrupts; here they come."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("interrupts", [1, 3])
 def test_interrupts_wait_until_every_agent_stands_at_the_same_trial(interrupts: int) -> None:
     def interrupt() -> None:

@@ -107,7 +107,7 @@ def test_weights_that_were_written_to_are_checked_at_the_next_trial() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"neuron": "gnm"}, "neuron must be one of GNM, LIF, MST, .*got 'gnm'"),
+        ({"neuron": "gnm"}, "neuron must be one of .*GNM.*got 'gnm'"),
         ({"neuron": GNM}, "neuron must be an instance, got the class GNM; write GNM"),
         ({"rule": GNM()}, "rule must be one of .*AggregateLabel.*got GNM"),
         ({"n_inputs": 0}, "n_inputs must be >= 1, got 0"),

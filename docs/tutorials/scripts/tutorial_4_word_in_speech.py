@@ -12,8 +12,8 @@ told no more than that learns to spike when it hears the word, in voices that it
 # -------------
 # The phrases ship with the project: synthetic speech (eSpeak NG), encoded in 24 bands as the
 # cochlea has them. Each band has two levels, and each crossing of one, up or down, is a spike: 96
-# channels, bins of 5 ms. Which words were said, and when, stays beside the trials; the neuron is not
-# told.
+# channels, bins of 5 ms. Which words were said, and when, stays beside the trials; the neuron is
+# not told.
 
 import matplotlib.pyplot as plt
 import numpy as np

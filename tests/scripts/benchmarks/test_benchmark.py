@@ -353,8 +353,8 @@ def test_the_command_ends_with_json_and_can_be_shown_again(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--repeats", 0], "--repeats must be >= 1, got 0"),
-        (["--seed", -1], "--seed must be >= 0, got -1"),
+        (["--repeats", 0], "--repeats: must be >= 1, got 0"),
+        (["--seed", -1], "--seed: must be >= 0, got -1"),
         (["--quick", "--full"], "exclude each other"),
         (["--quick", "--only", "loop", "--publish"], "not one with --quick and --only"),
         (["--repeats", 2, "--publish"], "not one with --repeats"),
