@@ -12,8 +12,8 @@ told no more than that learns to spike when it hears the word, in voices that it
 # -------------
 # The phrases ship with the project: synthetic speech (eSpeak NG), encoded in 24 bands as the
 # cochlea has them. Each band has two levels, and each crossing of one, up or down, is a spike: 96
-# channels, bins of 5 ms. Which words were said, and when, stays beside the trials; the neuron is not
-# told.
+# channels, bins of 5 ms. Which words were said, and when, stays beside the trials; the neuron is
+# not told.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -69,10 +69,12 @@ print(speech.text_table(rows))
 # %%
 # When it spikes
 # --------------
-# Nobody told it when the word was said. Recall is the share of sevens with a spike from their
-# beginning until 200 ms after their end, precision the share of its spikes that are such; mirrored,
-# the same spikes are counted from the end of the phrase, which is what chance would give.
+# Nobody told it when the word was said. Its spikes come at one latency, which training phrases
+# tell; with that taken off, recall is the share of sevens with a spike of their own, and precision
+# the share of spikes that are within a seven. Mirrored, the same spikes are counted from the end
+# of the phrase: what as many spikes at unrelated times would get.
 
+print(f"latency {5 * rows[-1].latency} ms, with it {rows[-1].timing}")
 speech.draw(agents[0], test, speech.shown_phrase(test))
 plt.show()
 
