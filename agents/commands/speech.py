@@ -32,9 +32,13 @@ def options(parser: Parser) -> None:
     add("what", choices=("run", "make"), nargs="?", default="run")
     add("--word", choices=DIGITS, default="seven", help="the word to be counted (default seven)")
     add("--phrases", type=Path, metavar="FILE", help="(default those that ship with the project)")
-    add("--learner", choices=tuple(speech.learners()), action="append", help="only these")
+    known = ", ".join(f"'{name}'" for name in speech.LEARNERS)
+    add(
+        "--learner", action="append", metavar="NAME", help=f"of {known}, or all (default the first)"
+    )
     add("--restarts", type=at_least(1), default=speech.RESTARTS, metavar="N")
     add("--epochs", type=at_least(1), default=speech.EPOCHS, metavar="N")
+    share(parser, "--runs", default=1, help="selections to take the median of")
     for split, size in SIZES.items():
         add(
             f"--{split}",
@@ -83,8 +87,8 @@ def _run(options: argparse.Namespace) -> dict[str, Any]:
         )
     delayed = {split: one.delayed(speech.DELAYS) for split, one in splits.items()}
     rows, best = speech.control_rows(splits), None
-    for name in options.learner or speech.learners():
-        learner = speech.learners()[name]
+    for name in _learners(options.learner):
+        learner = speech.LEARNERS[name]
         agents = speech.train(
             learner, delayed["train"],
             restarts=options.restarts, epochs=options.epochs, seed=options.seed,
@@ -93,9 +97,33 @@ def _run(options: argparse.Namespace) -> dict[str, Any]:
         if best is None or rows[-1].train > best[0]:
             best = (rows[-1].train, agents[0])
     print(speech.text_table(rows))
+    selections = []
+    if options.runs > 1:
+        selections = speech.selected(
+            speech.LEARNERS[speech.FIRST], delayed,
+            runs=options.runs, restarts=options.restarts, epochs=options.epochs,
+        )  # fmt: skip
+        shares = " ".join(f"{share:.1%}" for share in sorted(selections))
+        print(f"{speech.FIRST}, {options.runs} selections on test voices: {shares}")
+        print(f"median {np.median(selections):.1%}")
     assert best is not None
     figure = speech.draw(best[1], splits["test"], speech.shown_phrase(splits["test"]))
     folder = options.out or Path("runs/speech")
     picture = save(figure, folder, f"speech-{options.word}", ("png",))["png"]
     print(f"picture {picture}")
-    return {"rows": [asdict(row) for row in rows], "picture": str(picture)}
+    return {
+        "rows": [asdict(row) for row in rows],
+        "selections": selections,
+        "picture": str(picture),
+    }
+
+
+def _learners(given: list[str] | None) -> list[str]:
+    """The learners asked for. ValueError if there is no such one."""
+    wanted = given or [speech.FIRST]
+    for name in wanted:
+        if name not in (*speech.LEARNERS, "all"):
+            raise ValueError(
+                f"learner must be one of {', '.join(speech.LEARNERS)} or all, got {name}"
+            )
+    return list(speech.LEARNERS) if "all" in wanted else wanted

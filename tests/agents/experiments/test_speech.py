@@ -10,7 +10,7 @@ import pytest
 
 from agents import NeuronAgent
 from agents.experiments import speech
-from agents.experiments.speech import LATE, Timing, score, timing
+from agents.experiments.speech import Timing, latency_of, score, timing
 from gnm_env import Trial, Trials
 from gnm_env.speech import digits, part
 
@@ -68,8 +68,8 @@ def one_phrase(words: list[int], onsets: list[int], ends: list[int]) -> Trials:
     [
         ([], (0.0, 0.0)),
         ([30, 130], (1.0, 1.0)),
-        ([20, 140 + LATE - 1], (1.0, 1.0)),
-        ([19, 140 + LATE], (0.0, 0.0)),
+        ([20, 139], (1.0, 1.0)),
+        ([19, 140], (0.0, 0.0)),
         ([30, 31], (0.5, 0.5)),
         ([30, 90, 130], (1.0, 2 / 3)),
     ],
@@ -83,9 +83,17 @@ def test_each_word_gets_one_spike_at_most_from_its_first_bin_on(
 
 def test_mirrored_spikes_are_counted_from_the_end() -> None:
     phrase = one_phrase([7, 1], [0, 100], [20, 120])
-    late = [np.array([115 + LATE])]
+    late = [np.array([100])]
     assert timing(late, phrase) == (0.0, 0.0)
     assert timing(late, phrase, mirrored=True) == (1.0, 1.0)
+
+
+def test_latency_is_taken_off_and_found_in_training() -> None:
+    phrase = one_phrase([7, 1, 7], [20, 85, 120], [40, 95, 140])
+    late = [np.array([68, 168])]
+    assert timing(late, phrase) == (0.0, 0.0)
+    assert timing(late, phrase, latency=30) == (1.0, 1.0)
+    assert latency_of(late, phrase) == 30
 
 
 def test_a_perfect_neuron_has_perfect_scores() -> None:
