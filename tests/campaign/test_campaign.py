@@ -8,7 +8,7 @@ import pytest
 
 from tests.campaign import configurations, flips, kills, run, stores
 
-pytestmark = pytest.mark.filterwarnings("default")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
 def test_no_bad_input_crashes_hangs_or_ends_in_somebody_elses_traceback() -> None:
