@@ -93,7 +93,7 @@ class ObservationConfig:
         if isinstance(value, cls):
             return value
         known = {field.name for field in fields(cls)}
-        if not isinstance(value, Mapping) or not set(value) <= known:
+        if not isinstance(value, Mapping) or not {"decays"} <= set(value) <= known:
             raise ValueError(
                 f"an observation config must be an ObservationConfig, or a dict of its fields "
                 f"{', '.join(sorted(known))}, got {shown(value)}"

@@ -172,7 +172,7 @@ def test_a_policy_needs_the_task_that_it_was_trained_on(task: Any) -> None:
         SB3Agent(Recorder(), task)
 
 
-@pytest.mark.parametrize("config", [3, "x", {"bogus": 1}])
+@pytest.mark.parametrize("config", [3, "x", {}, {"decays": (), "bogus": 1}])
 def test_what_is_shown_must_be_an_observation_config(config: Any) -> None:
     with pytest.raises(ValueError, match="an observation config must be an ObservationConfig"):
         SB3Agent(Recorder(), TASK, config)
