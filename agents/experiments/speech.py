@@ -308,10 +308,11 @@ def text_table(rows: Sequence[Row]) -> str:
 
 
 def shown_phrase(phrases: Trials) -> int:
-    """Number of a phrase for a picture: the first with two of the word, not side by side."""
+    """Number of a phrase for a picture: the first with two of the word and others between them."""
     word = DIGITS.index(phrases.metadata["word"])
     for k, words in enumerate(phrases.columns["words"]):
-        if words.count(word) == 2 and len(words) >= 5 and words[-1] != word:
+        places = [place for place, said in enumerate(words) if said == word]
+        if len(places) == 2 and places[1] - places[0] > 1 and len(words) >= 5:
             return k
     return int(np.argmax(phrases.labels))
 
@@ -351,6 +352,7 @@ def draw(agent: NeuronAgent, phrases: Trials, number: int) -> Figure:
                     onset * BIN, end * BIN, color=RED if is_word else GREY,
                     alpha=0.18 if is_word else 0.07, lw=0,
                 )  # fmt: skip
+                axes.axvline(onset * BIN, color="white", lw=1.5, zorder=0)
             raster.annotate(
                 DIGITS[said], ((onset + end) / 2 * BIN, 1.02), xycoords=("data", "axes fraction"),
                 ha="center", color=RED if is_word else "0.3",
