@@ -162,6 +162,8 @@ class _Cache(FunctionCache):
             return None
         try:
             return super().load_overload(sig, target_context)
+        except ImportError:  # a user's class, whose module had another name when it was compiled
+            return None
         except Exception as error:  # whatever a file says that was whole, and yet is of no use
             _warn(f"compiled code in {self._cache_path} could not be used ({error!r})")
             return None

@@ -271,3 +271,27 @@ def test_a_source_that_has_gone_since_it_was_imported_stops_nothing(small: Path)
     gone = CALL.replace("import third\n", "import third\nimport os; os.remove('small.py')\n")
     done = ran(gone, small)
     assert done.stdout.split() == ["2.0", "0"]
+
+
+def test_a_class_whose_module_has_a_new_name_is_compiled_anew(tmp_path: Path) -> None:
+    (tmp_path / "inner_a.py").write_text(
+        "from gnm_env.compiled import compiled\n"
+        "@compiled\n"
+        "def inner(x):\n"
+        "    if x > 100.0:\n"
+        "        raise ValueError\n"
+        "    return 2.0 * x\n"
+    )
+    (tmp_path / "outer.py").write_text(
+        "from gnm_env.compiled import specialise\n"
+        "inner = None\n"
+        "def outer(x):\n"
+        "    return inner(x) + 1.0\n"
+        "def bound(to):\n"
+        "    return specialise(outer, 'own', inner=to)\n"
+    )
+    ask = "import outer, {0}; print(outer.bound({0}.inner)(1.0))"
+    assert printed(ask.format("inner_a"), tmp_path) == ("3.0",)
+    (tmp_path / "inner_a.py").rename(tmp_path / "inner_b.py")
+    again = ran(ask.format("inner_b"), tmp_path)
+    assert (again.stdout, again.stderr) == ("3.0\n", "")
