@@ -67,6 +67,8 @@ def test_internal_links_lead_somewhere(site: Path) -> None:
     parsed = dict(html_pages(site))
     dead = []
     for path, page in parsed.items():
+        if path.is_relative_to(site / "_modules"):
+            continue  # listings by Sphinx, which leads back under a name by which it also found it
         for link in page.links:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
