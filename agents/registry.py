@@ -149,10 +149,10 @@ def load_module(place: str) -> Any:
     path = Path(place).resolve()
     if not path.is_file():
         raise ValueError(f"there is no file {place}")
-    loaded = sys.modules.get(path.stem)
-    if loaded is not None and getattr(loaded, "__file__", None) == str(path):
-        return loaded
-    if loaded is not None:
+    for module in list(sys.modules.values()):  # imported already, perhaps as part of a package
+        if getattr(module, "__file__", None) == str(path):
+            return module
+    if path.stem in sys.modules:
         raise ValueError(
             f"{place} cannot be imported as {path.stem!r}: a module of that name is there already; "
             "rename the file"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,13 @@ import pytest
 from agents import GNM, MST, AggregateLabel, ErrorTrace, NeuronAgent
 from agents.explorer.teaching import emitted, teaching_signal, undone
 from agents.model import PSPKernel
+from agents.registry import find_rule
 from gnm_env import Trial, draw_trial
 from gnm_env.trial_task.info import info_of
-from tests.agents.own.my_rules import OwnTempotron
 from tests.agents.worlds import BUSY, BUSY_PATTERNS
+
+OWN_RULES = Path(__file__).parents[1] / "own" / "my_rules.py"
+OwnTempotron: Any = find_rule(f"{OWN_RULES}:OwnTempotron")
 
 
 def trial(seed: int) -> Trial:
