@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gnm_env.files import NotDefinedError
+
 _REGISTERED: dict[str, dict[str, type]] = {
     "neuron": {},
     "network": {},
@@ -170,12 +172,14 @@ def load_module(place: str) -> Any:
 
 
 def find_class(kind: str, name: str, where: str | None) -> type:
-    """The class that a checkpoint names; `where` is its home. ValueError says what to import."""
+    """The class that a checkpoint names, of home `where`. NotDefinedError says what to import."""
     known = _complete(kind)
     if name in known:
         return known[name]
     module = (where or "").partition(":")[0]
-    remedy = f"import {module} first" if module not in ("", "__main__") else "define it first"
-    raise ValueError(
+    remedy = "define it first"
+    if module not in ("", "__main__"):
+        remedy = f"import {module} first (on the command line: --import {module})"
+    raise NotDefinedError(
         f"the {kind} {name!r} is not known here ({where or 'its module was not kept'}): {remedy}"
     )

@@ -376,6 +376,10 @@ def _array_header(stream: IO[bytes], name: str) -> tuple[np.dtype[Any], tuple[in
     return dtype, shape, match[2] == b"True"
 
 
+class NotDefinedError(ValueError):
+    """A file is whole, but names a class that this process has not defined."""
+
+
 @contextlib.contextmanager
 def open_arrays(
     path: str | os.PathLike[str], *, limit: int = MAX_BYTES, what: str = "file of arrays"
@@ -408,6 +412,8 @@ def open_arrays(
                 yield ArrayFile(archive, size, limit)
         except OSError as error:
             raise _damaged(place, what, error) from None
+        except NotDefinedError as error:
+            raise ValueError(f"{place}: {error}") from None
         except _DAMAGE as error:
             kind = _described(place)
             if kind != _ZIP:

@@ -32,6 +32,7 @@ def options(parser: Parser) -> None:
         help="size of a file's frames, at most 1 (default 1)")
     share(parser, "--seed", default=EVALUATION_SEED, help="of the stream")
     share(parser, "--pattern-seed", help="other patterns than those it was saved with")
+    share(parser, "--import")
     share(parser, "--trust")
     # fmt: on
 

@@ -87,6 +87,7 @@ def test_a_fresh_process_loads_what_was_saved_once_it_knows_the_module(tmp_path:
     missing = run("my_rules")
     assert "ValueError" in missing.stderr
     assert "import my_neurons first" in missing.stderr
+    assert "damaged" not in missing.stderr
 
 
 def test_the_registry_lists_them_beside_those_of_the_package() -> None:
