@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from agents import registry
 from tests.docs.pages import ROOT, Block, blocks, name, pages
 
 MARKS = (None, "slow", "not run")
@@ -85,6 +86,16 @@ PROMISES: dict[str, Callable[[list[Names]], None]] = {
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
+
+
+@pytest.fixture(autouse=True)
+def _where_only_the_package_has_classes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page may give its classes names that other tests, or other pages, have given to theirs."""
+    own = {
+        kind: {n: cls for n, cls in known.items() if cls.__module__.startswith("agents.")}
+        for kind, known in registry._REGISTERED.items()
+    }
+    monkeypatch.setattr(registry, "_REGISTERED", own)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
