@@ -46,15 +46,15 @@ def logistic(x: Any) -> Any:
 
 
 @compiled
-def explore(p: Parameters, V: Any, threshold: Any, uniform: Any) -> Any:
-    """Whether a spike is drawn: with probability P = σ((V − ϑ)/ΔV)."""
-    return uniform < logistic((V - threshold) / p.width)
+def spike_probability(p: Parameters, V: Any, threshold: Any) -> Any:
+    """P = σ((V − ϑ)/ΔV)."""
+    return logistic((V - threshold) / p.width)
 
 
 @compiled
 def bin_signal(p: Parameters, b: BinOfTrial) -> Any:
     """y(t) = (r − r̄) (z(t) − P(t)) / ΔV."""
-    return b.E * (b.z - logistic((b.V - b.threshold) / p.width)) / p.width
+    return b.E * (b.z - b.X) / p.width
 
 
 @compiled
@@ -100,7 +100,7 @@ class PolicyGradient(Rule):
     uses_output: ClassVar[bool] = True
     parameters_type: ClassVar[Any] = Parameters
     memory_type: ClassVar[Any] = Memory
-    explore: ClassVar[Any] = explore
+    spike_probability: ClassVar[Any] = spike_probability
     weigh: ClassVar[Any] = weigh
     bin_signal: ClassVar[Any] = bin_signal
 

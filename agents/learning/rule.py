@@ -26,8 +26,9 @@ checkpoints: their names are the fields of its `memory_type`, 0 at first. `weigh
 (correction, memory)` makes of what the rule is told (see CORRECTIONS) what it learns by, 0 being
 nothing; it is written like `bin_signal`.
 
-`explore(p, V, threshold, uniform) -> bool` draws the output of a bin while the rule learns, for
-neurons that take no notice of their own output; written likewise.
+`spike_probability(p, V, threshold) -> P`, written likewise, makes the output a matter of chance
+while the rule learns: each bin has an output spike with probability P, independently of the others
+(`agents.training.exploration`). For neurons that take no notice of their own output.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ class BinOfTrial(NamedTuple):
     V: Any
     """Membrane potential."""
     X: Any
-    """Readout."""
+    """Readout; for a rule with a `spike_probability`, that probability."""
     E: Any
     """Error trace, where the rule uses it; else the correction, the same in every bin."""
     z: Any
@@ -195,7 +196,7 @@ class Rule(ABC):
     bin_signal: ClassVar[Any] = None
     side_by_side: ClassVar[Any] = None
     weigh: ClassVar[Any] = None
-    explore: ClassVar[Any] = None
+    spike_probability: ClassVar[Any] = None
     weight_change: ClassVar[Any] = in_proportion
     teach: ClassVar[Any] = None
     change: ClassVar[Any] = None
@@ -206,7 +207,7 @@ class Rule(ABC):
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         ways = ("teaching_signal", "bin_signal", "side_by_side", "teach", "change", "block_change")
-        registry.register("rule", cls, (*ways, "weight_change", "weigh", "explore"))
+        registry.register("rule", cls, (*ways, "weight_change", "weigh", "spike_probability"))
         if getattr(cls, "name", None) is None:
             return
         feedback = getattr(cls, "feedback", None)
@@ -219,7 +220,7 @@ class Rule(ABC):
                 f"{cls.__name__} must say what it teaches: by teaching_signal(static, V, E), "
                 "teach(p, trial, y) or change(p, trial, eligibility); see agents.learning.rule"
             )
-        names = ("teaching_signal", "bin_signal", "side_by_side", "weigh", "explore")
+        names = ("teaching_signal", "bin_signal", "side_by_side", "weigh", "spike_probability")
         parts = {name: getattr(cls, name) for name in names}
         cls._compiled = {name: part and portable(part) for name, part in parts.items()}
 

@@ -87,7 +87,8 @@ class Agent:
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
         self._rule_memory = np.zeros(len(rule.memory_type._fields))
-        self.rng = np.random.default_rng((seed, 3)) if rule.explore else None
+        self.rng = np.random.default_rng((seed, 3)) if rule.spike_probability else None
+        self._silence = np.ones(2)
         self._trials = 0
         self.overflowed = False
         self._prepare()
@@ -272,10 +273,20 @@ class Agent:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
             out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
         if self.rng is not None:
-            V = self._heard.V[self._bin, 0]
-            out = self._loops.explore_bin(self._rule_block, self._block, V, self.rng.random())
-            self._heard.output[self._bin] = out
+            out = self._drawn()
         self._bin += 1
+        return out
+
+    def _drawn(self) -> float:
+        """The output of this bin, drawn."""
+        assert self.rng is not None and self._heard is not None
+        if self._bin == 0:
+            self._silence[:] = 1.0, self.rng.random()
+        out: float = self._loops.explore_bin(
+            self._rule_block, self._block, self._heard, self._bin, self._silence
+        )
+        if out != 0.0:
+            self._silence[:] = 1.0, self.rng.random()
         return out
 
     def learn(self, reward: float, info: Mapping[str, Any], sign_only: bool = False) -> None:

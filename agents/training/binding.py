@@ -93,6 +93,7 @@ def _loops(key: Key) -> Any:
     alone = f"{key.label}_{key.width}"
     together = f"{key.taught}_{key.width}"
     flags = {name: of_rule[name] for name in ("USES_ERROR", "USES_OUTPUT", "USES_READOUT")}
+    flags["USES_READOUT"] &= not of_rule["EXPLORES"]  # what is drawn afterwards takes its place
     bins = specialise(run_bins_template, together, inline=True, **of_model, **flags)
     trial = specialise(
         run_trial_template, together, inline=True, **of_model, **flags, run_bins=bins
@@ -106,7 +107,7 @@ def _loops(key: Key) -> Any:
     if key.rule.weigh is not None:
         everything["weighed"] = specialise(weighed_template, together, **of_rule)
     explore_bin = None
-    if key.rule.explore is not None:
+    if key.rule.spike_probability is not None:
         names = {**of_rule, "THRESHOLD": _threshold_row(of_model)}
         everything["explore_trial"] = specialise(
             explore_trial_template, together, inline=True, **names
@@ -138,19 +139,20 @@ def _of_rule(key: Key) -> dict[str, Any]:
     rule, (feedback, learns_when_right) = key.rule, key.variant
     whole_trial = rule.teach is not None or rule.change is not None
     needs_readout = whole_trial or rule.bin_signal is not None
+    draws = rule.spike_probability is not None
     return {
         "WIDTH": key.width,
         "LEARN_WIDTH": min(key.width, LEARN_WIDTH),
         "USES_ERROR": rule.uses_error and feedback == "presentations",
         "USES_OUTPUT": whole_trial or rule.uses_output,
-        "USES_READOUT": needs_readout and not key.reads_V,
-        "READS_V": key.reads_V or not needs_readout,
+        "USES_READOUT": draws or (needs_readout and not key.reads_V),
+        "READS_V": not draws and (key.reads_V or not needs_readout),
         "LAG": key.lag if needs_readout else 0,
         "BIEXPONENTIAL": key.biexponential,
         "SEES_PRESENTATIONS": feedback == "presentations",
         "TOLD_REWARD": feedback == "reward",
         "WEIGHS": rule.weigh is not None,
-        "EXPLORES": rule.explore is not None,
+        "EXPLORES": draws,
         "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
         "OwnNumbers": rule.parameters_type,
         "Memory": rule.memory_type,

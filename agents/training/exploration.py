@@ -17,8 +17,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.learning.rule import Outcome
-from agents.simd import full, load, store, unpack, where
-from agents.training.slots import THRESHOLD, WIDTH, OwnNumbers, explore
+from agents.simd import any_lane, full, load, store, unpack, where
+from agents.training.slots import THRESHOLD, WIDTH, OwnNumbers, spike_probability
+from agents.training.stepwise import Heard
 from agents.training.trial import N_COMMON, ModelBlock, RuleBlock, TrialLog
 from gnm_env.compiled import compiled
 from gnm_env.segments import TrialArrays
@@ -69,17 +70,14 @@ def _moved_on(typing_context: Any, high: Any, low: Any, inc_high: Any, inc_low: 
 
 
 @compiled
-def draw_uniforms(state: NDArray[np.uint64], n_bins: int, uniforms: Any) -> None:
-    """One uniform number per bin and lane; `state` (4, WIDTH) is moved on."""
-    for lane in range(state.shape[1]):
-        high, low = state[0, lane], state[1, lane]
-        for t in range(n_bins):
-            high, low = _moved_on(high, low, state[2, lane], state[3, lane])
-            turn = high >> np.uint64(58)
-            mixed = high ^ low
-            bits = (mixed >> turn) | (mixed << ((np.uint64(64) - turn) & np.uint64(63)))
-            uniforms[t, lane] = (bits >> np.uint64(11)) * (1.0 / 9007199254740992.0)
-        state[0, lane], state[1, lane] = high, low
+def next_uniform(state: NDArray[np.uint64], lane: int) -> float:
+    """The next uniform number in 0 … 1 of one lane; `state` (4, WIDTH) is moved on."""
+    high, low = _moved_on(state[0, lane], state[1, lane], state[2, lane], state[3, lane])
+    state[0, lane], state[1, lane] = high, low
+    turn = high >> np.uint64(58)
+    mixed = high ^ low
+    bits = (mixed >> turn) | (mixed << ((np.uint64(64) - turn) & np.uint64(63)))
+    return (bits >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
 def explore_trial_template(
@@ -91,28 +89,54 @@ def explore_trial_template(
 ) -> Outcome:
     """Draw the output of a trial that has been heard: `log` and its Outcome are those of the draw.
 
-    For neurons that take no notice of their own output.
+    For neurons that take no notice of their own output. See `explore_bin_template`.
     """
     zero = full(0.0, WIDTH)
     own = unpack(OwnNumbers, rule.parameters[N_COMMON:], zero)
     threshold = load(model.parameters, THRESHOLD, zero)
-    draw_uniforms(state, trial.edges[len(trial.edges) - 1], log.output)
+    bars = np.empty((1, WIDTH))
+    for lane in range(WIDTH):
+        bars[0, lane] = next_uniform(state, lane)
+    bar = load(bars, 0, zero)
+    silence = full(1.0, WIDTH)
     emitted = zero
     owed = 0
     for segment in range(len(trial.target)):
         given = zero
         for t in range(trial.edges[segment], trial.edges[segment + 1]):
-            fires = explore(own, load(log.V, t, zero), threshold, load(log.output, t, zero))
+            probability = spike_probability(own, load(log.V, t, zero), threshold)
+            silence = silence * (1.0 - probability)
+            fires = silence <= bar
             z = where(fires, 1.0, zero)
+            store(log.readout, t, probability)
             store(log.output, t, z)
-            given = given + z
+            if any_lane(fires):
+                for lane in range(WIDTH):
+                    if log.output[t, lane] != 0.0:
+                        bars[0, lane] = next_uniform(state, lane)
+                bar = load(bars, 0, zero)
+                silence = where(fires, 1.0, silence)
+                given = given + z
         store(log.counts, segment, given)
         emitted = emitted + given
         owed += trial.target[segment]
     return Outcome(emitted, full(float(owed), WIDTH), emitted != float(owed))
 
 
-def explore_bin_template(rule: RuleBlock, model: ModelBlock, V: float, uniform: float) -> float:
-    """As `explore_trial`, one bin of one neuron: its output."""
+def explore_bin_template(
+    rule: RuleBlock, model: ModelBlock, heard: Heard, t: int, silence: NDArray[np.float64]
+) -> float:
+    """As `explore_trial`, one bin of one neuron: its output, noted in `heard` with its probability.
+
+    `silence` is (S, u): the probability Π(1 − P) that there would have been no spike since the last
+    one, or since the trial began, and a uniform number. The spike comes in the first bin in which S
+    is u or less, which has probability 1 − S; then both are drawn anew. So the odds are those of a
+    draw in each bin, for one random number a spike.
+    """
     own = unpack(OwnNumbers, rule.parameters[N_COMMON:], 0.0)
-    return 1.0 if explore(own, V, model.parameters[THRESHOLD, 0], uniform) else 0.0
+    probability = spike_probability(own, heard.V[t, 0], model.parameters[THRESHOLD, 0])
+    silence[0] = silence[0] * (1.0 - probability)
+    out = 1.0 if silence[0] <= silence[1] else 0.0
+    heard.readout[t, 0] = probability
+    heard.output[t, 0] = out
+    return out

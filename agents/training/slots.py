@@ -32,7 +32,7 @@ USES_ERROR = False
 USES_OUTPUT = False
 """Whether it is to hold the output of each bin."""
 USES_READOUT = False
-"""Whether it is to hold the readout, which is not V."""
+"""Whether it is to hold the readout, which is not V, or the probability of a spike."""
 BIEXPONENTIAL = False
 SEES_PRESENTATIONS = False
 TOLD_REWARD = False
@@ -45,7 +45,7 @@ BY_BIN = False
 """Whether the rule has a `bin_signal` or `side_by_side` instead of a `teaching_signal`."""
 correction: Any = None
 weigh: Any = None
-explore: Any = None
+spike_probability: Any = None
 Memory: Any = None
 teaching_signal: Any = None
 bin_signal: Any = None

@@ -43,7 +43,8 @@ class TrialLog(NamedTuple):
     output: Block
     """Output of each bin; kept only for rules that use it."""
     readout: Block
-    """X of each bin; kept only for rules that use it, where it is not V itself."""
+    """X of each bin, kept only for rules that use it, where it is not V itself; or the probability
+    of a spike, for rules that draw them."""
     counts: Block
     """Output in each segment."""
 

@@ -225,17 +225,20 @@ def test_stdp_and_mstdpet_by_hand() -> None:
 
 
 def test_policy_gradient_by_hand() -> None:
-    # Only bin 7 draws below its P: o = 1, r = −1, two above the mean of −3.
-    uniforms = [0.99] * 7 + [0.0] + [0.99] * 2
-    policy = rules.policy_gradient(FEW, HALF, WEIGHTS, uniforms, 1.0, 0.5, baseline=-3.0)
+    # A spike in bin 7, the next one after the end: o = 1, r = −1, two above the mean of −3.
     P = [1 / (1 + math.exp((1 - v) / 0.5)) for v in V]
+    silent = np.cumprod(1.0 - np.array(P))
+    draws = [(silent[6] + silent[7]) / 2, 1e-9]
+    policy = rules.policy_gradient(
+        FEW, HALF, WEIGHTS, iter(draws).__next__, 1.0, 0.5, baseline=-3.0
+    )
     y = [2 * ((t == 7) - P[t]) / 0.5 for t in range(10)]
     assert policy.spikes.tolist() == [t == 7 for t in range(10)]
     assert policy.baseline == pytest.approx(-2.9)
     x2 = y[7] + y[8] / 2 + y[9] / 4
     assert policy.lesson.change[2] == pytest.approx(x2, rel=1e-13)
     assert_taught(policy.lesson, y, policy.lesson.change)
-    first = rules.policy_gradient(FEW, HALF, WEIGHTS, uniforms)
+    first = rules.policy_gradient(FEW, HALF, WEIGHTS, iter(draws).__next__, width=0.5)
     assert first.baseline == -1.0
     assert_nothing(first.lesson)
 
@@ -526,9 +529,8 @@ def test_the_policy_gradient_is_that_of_the_log_likelihood() -> None:
     assert isinstance(neuron, GNM)
     rng = np.random.default_rng(5)
     for case in cases(neuron, n=8, seed=6):
-        uniforms = rng.random(case.trial.n_bins)
         policy = rules.policy_gradient(
-            case.trial, neuron, case.weights, uniforms, 1.0, 0.2, baseline=0.5
+            case.trial, neuron, case.weights, rng.random, 1.0, 0.2, baseline=0.5
         )
         advantage = -abs(case.trial.label - int(policy.spikes.sum())) - 0.5
 
@@ -556,8 +558,8 @@ def test_the_error_traces_gradient_is_that_of_the_sum_of_E_times_V() -> None:
 
 
 def _policy(trial: Trial, neuron: Any, weights: Floats) -> Lesson:
-    uniforms = np.random.default_rng(8).random(trial.n_bins)
-    return rules.policy_gradient(trial, neuron, weights, uniforms, baseline=-0.5).lesson
+    uniform = np.random.default_rng(8).random
+    return rules.policy_gradient(trial, neuron, weights, uniform, baseline=-0.5).lesson
 
 
 EVERY_RULE: dict[str, Callable[[Trial, Spec, Floats], Lesson]] = {

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from agents import GNM, NeuronAgent, PolicyGradient, learning, record
 from agents.learning.teaching import HeardTrial
@@ -109,9 +110,8 @@ def test_the_policy_gradient_draws_and_learns_as_the_second_opinion_does(neuron:
     rng, baseline, taught = np.random.default_rng((7, 3)), None, 0
     weights, velocity = agent.weights.copy(), agent.velocity.copy()
     for case in made:
-        uniforms = rng.random(case.trial.n_bins)
         policy = rules.policy_gradient(
-            case.trial, NEURONS[neuron], weights, uniforms, 0.02, 0.2, baseline, 0.3
+            case.trial, NEURONS[neuron], weights, rng.random, 0.02, 0.2, baseline, 0.3
         )
         spikes = play(agent, trial_for(case))
         assert np.array_equal(spikes, policy.spikes)
@@ -122,6 +122,23 @@ def test_the_policy_gradient_draws_and_learns_as_the_second_opinion_does(neuron:
         agent.weights, agent.velocity = weights, velocity
         taught += policy.lesson.teaches
     assert taught >= 20
+
+
+def test_spikes_of_the_policy_gradient_are_independent_draws_in_each_bin() -> None:
+    """χ² of each bin's share beside P, and of neighbouring pairs beside P(t)P(t + 1)."""
+    neuron, rule, n = NEURONS["gnm"], PolicyGradient(learning_rate=0.0, width=0.5), 4_000
+    case = trials.cases(neuron, n=1, seed=3)[0]
+    agent = agent_for(case, rule, seed=11)
+    trial = trial_for(case)
+    z = np.array([play(agent, trial) for _ in range(n)], np.float64)
+    P = rules.policy_gradient(case.trial, neuron, case.weights, lambda: 0.5, width=0.5).probability
+    assert P.max() > 0.3
+    alone = (z.mean(axis=0) - P) / np.sqrt(P * (1.0 - P) / n)
+    P2 = P[:-1] * P[1:]
+    paired = ((z[:, :-1] * z[:, 1:]).mean(axis=0) - P2) / np.sqrt(P2 * (1.0 - P2) / n)
+    for deviations in (alone, paired):
+        # Of a false alarm: 1 in 1,000, and the seed is fixed.
+        assert np.sum(deviations**2) < chi2.ppf(0.999, len(deviations))
 
 
 @pytest.mark.parametrize(("name", "neuron"), cells())

@@ -100,11 +100,11 @@ worked out here and checked by summing), Chronotron's I_i, MPDAL's choice of the
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tests.agents.learning.oracles import events
 from tests.agents.learning.oracles.critical import critical_thresholds
@@ -519,20 +519,29 @@ def policy_gradient(
     trial: Trial,
     neuron: GNM,
     weights: ArrayLike,
-    uniforms: Sequence[float] | NDArray[np.float64],
+    uniform: Callable[[], float],
     learning_rate: float = 0.01,
     width: float = 0.1,
     baseline: float | None = None,
     baseline_rate: float = 0.05,
 ) -> Policy:
-    """REINFORCE with escape noise; `uniforms` are the agent's (T,), `baseline` r̄ or None at first.
+    """REINFORCE with escape noise; `uniform` draws a number, `baseline` is r̄ or None at first.
+
+    A spike comes as soon as the hazard −Σ ln(1 − P) since the last one has reached one unit
+    exponential number, −ln u: in each bin with probability P, whatever was before.
 
     ln P(z) = Σ_t z ln P + (1−z) ln(1−P), and its derivative with respect to w_i is
     Σ_t x_i(t)(z − P)/ΔV where V is linear in the weights: exact at η = 0.
     """
     V = hear(neuron, trial.raster, weights).V
     P = np.array([_logistic((v - neuron.threshold) / width) for v in V])
-    z = np.array([u < p for u, p in zip(uniforms, P, strict=True)], np.bool_)
+    z = np.zeros(len(P), np.bool_)
+    left = -math.log(uniform())
+    for t, v in enumerate(V):
+        left -= float(np.logaddexp(0.0, (v - neuron.threshold) / width))
+        if left <= 0.0:
+            z[t] = True
+            left = -math.log(uniform())
     reward = -float(abs(trial.label - int(z.sum())))
     mean = reward if baseline is None else baseline
     y = (reward - mean) * (z - P) / width
