@@ -16,7 +16,8 @@ from gnm_env.compiled import compiled
 class Parameters(NamedTuple):
     """The rule's numbers."""
 
-    width: Any
+    slope: Any
+    """1/ΔV"""
     baseline_rate: Any
 
 
@@ -33,14 +34,14 @@ class Memory(NamedTuple):
 def logistic(x: Any) -> Any:
     """1 / (1 + e^(−x)), x within −40 … 40, in multiplications that are the same in every lane.
 
-    e^(−x) is the 256th power of e^(−x/256), which is the sum of its first eleven terms.
+    e^(−x) is the 1,024th power of e^(−x/1,024), which is the sum of its first eight terms.
     """
     x = where(x < -40.0, -40.0, where(x > 40.0, 40.0, x))
-    s = x * (-1.0 / 256.0)
-    power = like(1.0, x)
-    for n in range(10, 0, -1):
-        power = 1.0 + s * power * (1.0 / n)
-    for _ in range(8):
+    s = x * (-1.0 / 1024.0)
+    power = 1.0 / 720.0 + s * (1.0 / 5040.0)
+    power = 1.0 / 24.0 + s * (1.0 / 120.0 + s * power)
+    power = 1.0 + s * (1.0 + s * (0.5 + s * (1.0 / 6.0 + s * power)))
+    for _ in range(10):
         power = power * power
     return 1.0 / (1.0 + power)
 
@@ -48,13 +49,13 @@ def logistic(x: Any) -> Any:
 @compiled
 def spike_probability(p: Parameters, V: Any, threshold: Any) -> Any:
     """P = σ((V − ϑ)/ΔV)."""
-    return logistic((V - threshold) / p.width)
+    return logistic((V - threshold) * p.slope)
 
 
 @compiled
 def bin_signal(p: Parameters, b: BinOfTrial) -> Any:
     """y(t) = (r − r̄) (z(t) − P(t)) / ΔV."""
-    return b.E * (b.z - b.X) / p.width
+    return b.E * (b.z - b.X) * p.slope
 
 
 @compiled
@@ -108,6 +109,9 @@ class PolicyGradient(Rule):
         super().__post_init__()
         real("width", self.width, above=0.0)
         real("baseline_rate", self.baseline_rate, low=0.0, high=1.0)
+
+    def own_numbers(self, model: Model) -> tuple[float, ...]:
+        return (1.0 / self.width, self.baseline_rate)
 
     def kernel(self, model: Model) -> PSPKernel:
         if not (isinstance(model, GNM) and model.readout == "V"):
