@@ -253,7 +253,7 @@ class Trials:
 
         Columns that a part lacks are None there; of the metadata stays what all parts agree on.
         """
-        held = list(parts)
+        held = list(parts) if isinstance(parts, Iterable) else [parts]
         if not held or not all(isinstance(part, Trials) for part in held):
             raise ValueError(f"give at least one Trials to concatenate, got {shown(held)}")
         _require_equal("n_inputs", [part.n_inputs for part in held])
