@@ -31,6 +31,7 @@ from agents.training.source import Source, source_of
 from gnm_env import Patterns, Task, Trials, draw_trial
 from tests.agents.learning.table import RULES
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, play, trial_env
+from tests.marks import EXHAUSTIVE
 
 TRIALS = 120
 
@@ -60,17 +61,26 @@ QUICK = {
 }
 
 
+def marks(rule: str, neuron: str) -> Any:
+    """How long a rule on a neuron takes to compile decides how often it is tried.
+
+    Quick tests take some; slow ones each other rule once, on one neuron after the other.
+    """
+    if (rule, neuron) in QUICK:
+        return ()
+    seldom = list(MADE).index(rule) % len(NEURONS) != list(NEURONS).index(neuron)
+    known = any(rule == quick for quick, _ in QUICK)
+    return EXHAUSTIVE if seldom or known else pytest.mark.slow
+
+
 def cells() -> list[Any]:
-    """One test parameter per rule and neuron; most of them slow, for they take long to compile."""
+    """One test parameter per rule and neuron."""
     return [
-        pytest.param(
-            rule, neuron, id=f"{rule}-{neuron}",
-            marks=() if (rule, neuron) in QUICK else pytest.mark.slow,
-        )
+        pytest.param(rule, neuron, id=f"{rule}-{neuron}", marks=marks(rule, neuron))
         for rule in MADE
         for neuron in NEURONS
         if rule != "policy-gradient" or neuron in ("gnm", "gnm-h200")
-    ]  # fmt: skip
+    ]
 
 
 @cache
@@ -139,7 +149,12 @@ def test_side_by_side_each_ends_with_the_bits_that_it_has_alone(rule: str, neuro
     ("rule", "neuron"),
     [
         ("critical", "gnm"),
-        *(pytest.param(*cell.values, marks=pytest.mark.slow) for cell in cells()[1:]),
+        pytest.param("peak-error", "lif", marks=pytest.mark.slow),
+        *(
+            pytest.param(*cell.values, marks=EXHAUSTIVE)
+            for cell in cells()[1:]
+            if cell.values != ("peak-error", "lif")
+        ),
     ],
 )
 def test_over_threads_and_in_blocks_of_lanes_too(rule: str, neuron: str) -> None:
