@@ -61,16 +61,14 @@ QUICK = {
 }
 
 
-def marks(rule: str, neuron: str) -> Any:
-    """How long a rule on a neuron takes to compile decides how often it is tried.
+SLOW = {"mpdal": "gnm-d", "psd": "gnm-h200", "span": "lif"}
+"""Some rules more that the slow tests take, on one neuron each; the exhaustive ones take all."""
 
-    Quick tests take some; slow ones each other rule once, on one neuron after the other.
-    """
+
+def marks(rule: str, neuron: str) -> Any:
     if (rule, neuron) in QUICK:
         return ()
-    seldom = list(MADE).index(rule) % len(NEURONS) != list(NEURONS).index(neuron)
-    known = any(rule == quick for quick, _ in QUICK)
-    return EXHAUSTIVE if seldom or known else pytest.mark.slow
+    return pytest.mark.slow if SLOW.get(rule) == neuron else EXHAUSTIVE
 
 
 def cells() -> list[Any]:
@@ -149,12 +147,7 @@ def test_side_by_side_each_ends_with_the_bits_that_it_has_alone(rule: str, neuro
     ("rule", "neuron"),
     [
         ("critical", "gnm"),
-        pytest.param("peak-error", "lif", marks=pytest.mark.slow),
-        *(
-            pytest.param(*cell.values, marks=EXHAUSTIVE)
-            for cell in cells()[1:]
-            if cell.values != ("peak-error", "lif")
-        ),
+        *(pytest.param(*cell.values, marks=EXHAUSTIVE) for cell in cells()[1:]),
     ],
 )
 def test_over_threads_and_in_blocks_of_lanes_too(rule: str, neuron: str) -> None:
