@@ -39,10 +39,10 @@ test: $(VENV)/.for-test  ## formatter, linter, type checker and all fast tests
 	$(RUN) -m pytest -m "not slow" $(ARGS)
 
 test-slow: $(VENV)/.for-test  ## the long tests that make test leaves out: scores, kills, bad inputs
-	$(RUN) -m pytest -m "slow and not exhaustive" $(ARGS)
+	$(RUN) -m pytest -m "slow and not exhaustive and not timed" $(ARGS)
 
-test-exhaustive: $(VENV)/.for-test  ## every rule on every neuron at every width: hours of compiling
-	$(RUN) -m pytest -m exhaustive $(ARGS)
+test-exhaustive: $(VENV)/.for-test  ## every rule on every neuron (an hour of compiling), and speed
+	$(RUN) -m pytest -m "exhaustive or timed" $(ARGS)
 
 test-checked: $(VENV)/.for-test  ## random tasks, agents and environments, every array access checked
 	$(RUN) tests/campaign/run.py --only environments --only configurations --count 100 --pairs 1 $(ARGS)

@@ -72,7 +72,12 @@ QUICK = {
 }
 """Numbers of lanes that the quick tests take; they share kernels with tests elsewhere."""
 
-SLOW = {("lif", "all"): 2, ("gnm-h7.3", "et"): 7}
+SLOW = {
+    ("lif", "all"): 2,
+    ("gnm-h7.3", "et"): 7,
+    ("gnm-step", "all"): 64,
+    ("mst", "et-modulated"): 64,
+}
 """The number of lanes that the slow tests take for some pairs more; exhaustive ones take all."""
 
 

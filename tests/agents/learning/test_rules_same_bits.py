@@ -61,8 +61,20 @@ QUICK = {
 }
 
 
-SLOW = {"mpdal": "gnm-d", "psd": "gnm-h200", "span": "lif"}
-"""Some rules more that the slow tests take, on one neuron each; the exhaustive ones take all."""
+SLOW = {
+    "mpdal": "gnm-d",
+    "tempotron": "mst",
+    "peak-error-first": "lif",
+    "surrogate-triangle": "gnm-d",
+    "surrogate-count": "mst",
+    "resume": "lif",
+    "psd": "gnm-h200",
+    "span": "lif",
+    "chronotron": "gnm",
+    "chronotron-i": "gnm-h200",
+}
+"""The neuron on which the slow tests take a rule that the quick ones leave out; the exhaustive
+tests take all."""
 
 
 def marks(rule: str, neuron: str) -> Any:
