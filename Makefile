@@ -14,8 +14,8 @@ RECENT = import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 WHOLE = import sys, pip; sys.exit(sys.version_info < (3, 11) or sys.prefix == sys.base_prefix)
 NEEDS = $(VENV)/.made pyproject.toml constraints.txt
 
-.PHONY: help train evaluate show explore test test-slow test-checked campaign format benchmark \
-	reproduce report-check league docs docs-open clean distclean
+.PHONY: help train evaluate show explore test test-slow test-exhaustive test-checked campaign \
+	format benchmark reproduce report-check league docs docs-open clean distclean
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s%s\n", $$1, $$2 }' Makefile
@@ -38,11 +38,14 @@ test: $(VENV)/.for-test  ## formatter, linter, type checker and all fast tests
 	$(RUN) -m mypy
 	$(RUN) -m pytest -m "not slow" $(ARGS)
 
-test-slow: $(VENV)/.for-test  ## the long statistical tests that make test leaves out
-	$(RUN) -m pytest -m slow $(ARGS)
+test-slow: $(VENV)/.for-test  ## the long tests that make test leaves out: scores, kills, bad inputs
+	$(RUN) -m pytest -m "slow and not exhaustive and not timed" $(ARGS)
+
+test-exhaustive: $(VENV)/.for-test  ## every rule on every neuron (an hour of compiling), and speed
+	$(RUN) -m pytest -m "exhaustive or timed" $(ARGS)
 
 test-checked: $(VENV)/.for-test  ## random tasks, agents and environments, every array access checked
-	$(RUN) tests/campaign/run.py --only configurations --count 30 $(ARGS)
+	$(RUN) tests/campaign/run.py --only environments --only configurations --count 100 --pairs 1 $(ARGS)
 
 campaign: $(VENV)/.for-test  ## bad inputs, kills, changed bytes: make campaign ARGS="--size full"
 	$(RUN) tests/campaign/run.py $(ARGS)

@@ -15,6 +15,7 @@ from agents.neurons.neuron import Neuron
 from agents.training.agent import Agent
 from agents.training.loop import train
 from agents.training.many import train_many
+from gnm_env.checks import shown
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial
 from gnm_env.trial_task.env import PatternTrialEnv
@@ -33,10 +34,7 @@ def check_neuron(neuron: Any) -> None:
         ValueError: in a sentence that says what is wrong: a line that cannot serve neurons side by
             side, other bits at another width, or a state of zeros that is not rest.
     """
-    if not isinstance(neuron, Neuron):
-        raise ValueError(
-            f"neuron must be an instance of a class derived from Neuron, got {neuron!r}"
-        )
+    _require_neuron(neuron)
     _check_parameters(neuron)
     _check_rest(neuron)
     _check_widths(neuron, AggregateLabel(1e-2, fraction=0.25))
@@ -46,7 +44,16 @@ def check_rule(rule: Any, neuron: Any = None) -> None:
     """Try `rule` on `neuron` (None: a GNM) as `check_neuron` does; returns if all is well."""
     if not isinstance(rule, Rule):
         raise ValueError(f"rule must be an instance of a class derived from Rule, got {rule!r}")
+    if neuron is not None:
+        _require_neuron(neuron)
     _check_widths(GNM() if neuron is None else neuron, rule)
+
+
+def _require_neuron(neuron: Any) -> None:
+    if not isinstance(neuron, Neuron):
+        raise ValueError(
+            f"neuron must be an instance of a class derived from Neuron, got {shown(neuron)}"
+        )
 
 
 def _check_parameters(neuron: Neuron) -> None:

@@ -225,7 +225,9 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
     return agent
 
 
-def _class(kind: str, named: dict[str, Any]) -> Any:
+def _class(kind: str, named: Any) -> Any:
+    if not isinstance(named, dict):
+        raise ValueError(f"its header does not name the class of its {kind}, but {named!r}")
     home = named.get("class")  # format 1 does not tell it
     if home is not None and not (isinstance(home, str) and ":" in home):
         raise ValueError(f"its header does not name the class of its {kind}, but {home!r}")

@@ -16,6 +16,7 @@ from agents.history import History
 from agents.recording import record
 from agents.training.source import source_of
 from gnm_env import Patterns, Task, Trial, Trials, colours
+from gnm_env.checks import shown
 from gnm_env.colours import MISTAKE, as_hex
 
 if TYPE_CHECKING:
@@ -156,6 +157,12 @@ def plot(
         in continuous time the bins that give S, (c) with `history` the learning curve.
     """
     trial = shown_trial(task, patterns)
+    if history is not None and not isinstance(history, History):
+        raise ValueError(f"history must be a History, got {shown(history)}")
+    if history is not None and history.error_rate.ndim != 1:
+        raise ValueError(
+            "history must be that of one agent, got one of several: give history.of(k)"
+        )
     heights = (1.3, 1, 1)[: 2 + (history is not None)]
     with styled():
         import matplotlib.pyplot as plt

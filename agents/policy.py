@@ -141,19 +141,24 @@ class PolicyBatch:
         self, bits: NDArray[np.int8], state: Any, begins: NDArray[np.bool_]
     ) -> tuple[NDArray[Any], Any]:
         """What the policy answers to one bin of n streams, (n,), and its state; checked."""
-        given = self._policy.predict(bits, state, begins, True)
-        if not isinstance(given, tuple) or len(given) != 2:
-            raise ValueError(
-                f"predict must return the actions and the state, got {shown(given)}; "
-                "return (actions, None) where there is no state"
-            )
-        actions = np.asarray(given[0])
+        answered, state = answer_of(self._policy.predict(bits, state, begins, True))
+        actions = np.asarray(answered)
         if actions.shape != (len(bits),) or not np.isin(actions, (0, 1)).all():
             raise ValueError(
                 f"predict must answer {len(bits)} streams with one action each, 0 or 1, "
-                f"got {shown(given[0])}"
+                f"got {shown(answered)}"
             )
-        return actions, given[1]
+        return actions, state
+
+
+def answer_of(given: Any) -> tuple[Any, Any]:
+    """The actions and the state that a policy's `predict` gave; ValueError if it is not both."""
+    if not isinstance(given, tuple) or len(given) != 2:
+        raise ValueError(
+            f"predict must return the actions and the state, got {shown(given)}; "
+            "return (actions, None) where there is no state"
+        )
+    return given
 
 
 class _Bare(PolicyAgent):

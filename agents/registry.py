@@ -117,6 +117,10 @@ def find(kind: str, spec: str) -> type:
 
     Raises ValueError if there is none.
     """
+    if not isinstance(spec, str):
+        raise ValueError(
+            f"a {kind} must be given by its name, or as module:Class or file.py:Class, got {spec!r}"
+        )
     place, _, class_name = spec.rpartition(":")
     if not place:
         known = _complete(kind)
@@ -138,6 +142,8 @@ def find(kind: str, spec: str) -> type:
 def load_module(place: str) -> Any:
     """The module named `place`, or that of the file `place`."""
     if not place.endswith(".py"):
+        if place.startswith("."):
+            raise ValueError(f"cannot import {place}: give the module's whole name, or its file")
         sys.path.insert(0, "")  # as `python -m` does: modules of the folder one stands in
         try:
             return importlib.import_module(place)

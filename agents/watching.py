@@ -12,14 +12,19 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.policy import answer_of, as_agent
 from gnm_env import Patterns, Task
-from gnm_env.checks import choice, real, whole
-from gnm_env.files import atomic_write
+from gnm_env.checks import MAX_BINS, choice, real, require_memory, whole
+from gnm_env.files import atomic_write, path_of
+from gnm_env.task import task_arrays
 
 STREAM, TRIALS = "stream", "trials"
 _IDS = {STREAM: "gnm/PatternStream-v0", TRIALS: "gnm/PatternTrial-v0"}
 MOST_COLOURS = 64
 """Of a GIF: the pictures have few, and fewer make the file small."""
+
+FRAME_BYTES = 2.0**20
+"""About as many bytes as a frame has that an environment draws."""
 
 Frame = NDArray[np.uint8]
 
@@ -59,9 +64,17 @@ def play(
         ImportError: if a package is missing; it says which extra brings it.
     """
     choice("hears", hears, (STREAM, TRIALS))
-    bins, every = whole("bins", bins, low=1), whole("every", every, low=1)
-    fps, scale = real("fps", fps, above=0.0), real("scale", scale, above=0.0, high=1.0)
-    write = None if path is None else _writer(Path(path))
+    bins, every = whole("bins", bins, low=1, high=MAX_BINS), whole("every", every, low=1)
+    fps, scale = real("fps", fps, 0.01, 1000.0), real("scale", scale, above=0.0, high=1.0)
+    task_arrays(task, patterns)  # refuses what does not belong together
+    if not hasattr(agent, "potential"):
+        as_agent(agent)  # refuses what cannot answer
+    write = None if path is None else _writer(path_of(path, "write"))
+    if write is _write_gif:  # which holds all its frames
+        require_memory(
+            f"a GIF of {bins // every:,} frames", FRAME_BYTES * scale**2 * (bins // every),
+            "lower bins or scale, raise every, or write an .mp4",
+        )  # fmt: skip
     graded = bool(getattr(agent, "graded", getattr(getattr(agent, "model", None), "graded", False)))
     if graded and hears == STREAM:
         raise ValueError(f"{type(agent).__name__} gives amounts, not spikes: use hears={TRIALS!r}")
@@ -119,9 +132,10 @@ def _answering(agent: Any, env: Any) -> Callable[[NDArray[np.int8], bool], Any]:
 
     def predict(obs: NDArray[np.int8], begins: bool) -> Any:
         nonlocal state
-        action, state = agent.predict(
+        given = agent.predict(
             obs, state=state, episode_start=np.array([begins]), deterministic=True
         )
+        action, state = answer_of(given)
         return action if np.size(action) > 1 else np.asarray(action).reshape(-1)[0]
 
     return predict

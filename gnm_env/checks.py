@@ -128,6 +128,14 @@ def whole_array(
     return np.array(array, dtype, order="C")
 
 
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A view of a contiguous `array` that cannot be written to, and not be made writeable either.
+
+    A view whose flag alone says so could be: it would be enough to set the flag.
+    """
+    return np.asarray(array.data.toreadonly())
+
+
 def generator(name: str, value: Any) -> np.random.Generator:
     """`value` if it is a NumPy Generator, else ValueError."""
     if not isinstance(value, np.random.Generator):

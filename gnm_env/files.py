@@ -130,7 +130,7 @@ def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]
 
 def _checked_target(path: Any) -> tuple[Path, int | None]:
     """The file to replace, links followed, and its permissions if it exists; or ValueError."""
-    target = _path(path, "write")
+    target = path_of(path, "write")
     try:
         target = Path(os.path.realpath(target))
         status = os.stat(target)
@@ -159,7 +159,8 @@ def _checked_target(path: Any) -> tuple[Path, int | None]:
     return target, stat.S_IMODE(status.st_mode)
 
 
-def _path(path: Any, verb: str) -> Path:
+def path_of(path: Any, verb: str) -> Path:
+    """`path` as a Path; ValueError, "cannot `verb` …", if it is none."""
     try:
         return Path(os.fsdecode(path))
     except TypeError:
@@ -394,7 +395,7 @@ def open_arrays(
     be read, is no npz file or is damaged; and makes a sentence about the file of any error that
     its contents cause within the block: LookupError, TypeError, ValueError, OverflowError.
     """
-    place = _path(path, "read")
+    place = path_of(path, "read")
     try:
         mode = os.stat(place).st_mode
         file = open(place, "rb") if stat.S_ISREG(mode) else None  # noqa: SIM115

@@ -16,6 +16,7 @@ from gnm_env.checks import (
     MAX_INPUTS,
     MAX_SEED,
     MAX_TARGET,
+    read_only,
     real,
     require_memory,
     shown,
@@ -169,9 +170,14 @@ class Task:
                 f"give either task or its fields as keywords, got task and {', '.join(keywords)}; "
                 "use dataclasses.replace(task, …) to change a field"
             )
-        if not isinstance(task, Task):
-            raise ValueError(f"task must be a gnm_env.Task, got {type(task).__name__}")
+        require_task(task)
         return task
+
+
+def require_task(task: Any) -> None:
+    """ValueError unless `task` is a Task."""
+    if not isinstance(task, Task):
+        raise ValueError(f"task must be a gnm_env.Task, got {shown(task)}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -207,8 +213,7 @@ class Patterns:
                 f"{self.shape[0] * self.shape[1]:,} bins and one more, got {len(offsets):,}"
             )
         for name, array in (("channels", channels), ("offsets", offsets)):
-            array.setflags(write=False)
-            put(name, array)
+            put(name, read_only(array))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Through the constructor, so that what is unpickled is checked."""
@@ -223,8 +228,7 @@ class Patterns:
         The generator is default_rng((seed, 1)), so that equal seeds mean equal patterns everywhere
         and a stream with the same seed shares no bits with them.
         """
-        if not isinstance(task, Task):
-            raise ValueError(f"task must be a gnm_env.Task, got {shown(task)}")
+        require_task(task)
         seed = whole("pattern seed", seed, low=0, high=MAX_SEED)
         shape = (task.n_classes, task.pattern_bins, task.n_inputs)
         require_memory(
@@ -306,8 +310,13 @@ def checked_events(
 def sparse(bits: ArrayLike, name: str) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Channels and offsets per bin of a raster (bins, channels); ValueError if not binary."""
     raster = np.asarray(bits)
+    # One that takes no memory itself may be spread out: np.broadcast_to, a file mapped to memory.
+    require_memory(f"{name} of shape {raster.shape}", 2.0 * raster.size, "give less of it")
     if raster.dtype != np.bool_:
-        if not np.issubdtype(raster.dtype, np.number) or not np.isin(raster, (0, 1)).all():
+        numbers = np.issubdtype(raster.dtype, np.integer) or np.issubdtype(
+            raster.dtype, np.floating
+        )
+        if not numbers or not np.isin(raster, (0, 1)).all():
             raise ValueError(f"{name} must be binary (0 and 1 only), got {raster.dtype} values")
         raster = raster != 0
     offsets = np.zeros(len(raster) + 1, np.int64)

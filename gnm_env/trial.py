@@ -17,6 +17,7 @@ from gnm_env.checks import (
     MAX_LABEL,
     MAX_TARGET,
     generator,
+    read_only,
     shown,
     whole,
     whole_array,
@@ -31,6 +32,7 @@ from gnm_env.task import (
     TaskArrays,
     checked_events,
     dense,
+    require_task,
     sparse,
     task_arrays,
 )
@@ -143,17 +145,17 @@ class Trial:
     @property
     def channels(self) -> NDArray[np.int32]:
         """The channel of each input spike, ascending within a bin; (events,)."""
-        return _locked(self._arrays.channels.view())
+        return read_only(self._arrays.channels)
 
     @property
     def offsets(self) -> NDArray[np.int64]:
         """The spikes of bin t are channels[offsets[t] : offsets[t + 1]]; (T + 1,)."""
-        return _locked(self._arrays.offsets.view())
+        return read_only(self._arrays.offsets)
 
     @property
     def edges(self) -> NDArray[np.int64]:
         """Segment s covers the bins edges[s] … edges[s + 1] − 1; (2K + 2,), see `segments`."""
-        return _locked(self._arrays.edges.view())
+        return read_only(self._arrays.edges)
 
     @property
     def target(self) -> NDArray[np.int64]:
@@ -161,27 +163,27 @@ class Trial:
 
         Where only the label is known the one segment is owed the label.
         """
-        return _locked(self._arrays.target.view())
+        return read_only(self._arrays.target)
 
     @property
     def onsets(self) -> NDArray[np.int64]:
         """First bin of each presentation, ascending; (K,)."""
-        return _locked(self._arrays.edges[1:-1:2].copy())
+        return read_only(self._arrays.edges[1:-1:2].copy())
 
     @property
     def ends(self) -> NDArray[np.int64]:
         """The bin after the last of each presentation; (K,)."""
-        return _locked(self._arrays.edges[2::2].copy())
+        return read_only(self._arrays.edges[2::2].copy())
 
     @property
     def classes(self) -> NDArray[np.int64]:
         """Class of each presentation, from 0; (K,)."""
-        return _locked(self._classes.view())
+        return read_only(self._classes)
 
     @property
     def targets(self) -> NDArray[np.int64]:
         """Output spikes owed by each presentation; (K,)."""
-        return _locked(self._arrays.target[1::2].copy())
+        return read_only(self._arrays.target[1::2].copy())
 
     @property
     def n_inputs(self) -> int:
@@ -252,7 +254,7 @@ class Trial:
         Raises ValueError if the raster is not binary or not N wide, or if presentations overlap,
         leave the trial, or have no such class.
         """
-        bits = _raster(raster, None if task is None else task.n_inputs)
+        bits = _raster(raster, _n_inputs(task))
         channels, offsets = sparse(bits, "a raster")
         presentations = _presentations(onsets, classes, task, ends, lengths, targets, label)
         return cls(channels, offsets, n_inputs=bits.shape[1], **presentations)
@@ -282,16 +284,18 @@ class Trial:
         Several spikes of a channel within one bin count as one, with a warning that says how many
         did. Raises ValueError as `from_dense` does, and for times outside 0 … n_bins · bin_width.
         """
-        n_inputs = None if task is None else task.n_inputs
-        channels, offsets, merged = binned(times, n_bins, bin_width, n_inputs)
+        channels, offsets, merged = binned(times, n_bins, bin_width, _n_inputs(task))
         warn_of_merged(merged)
         presentations = _presentations(onsets, classes, task, ends, lengths, targets, label)
         return cls(channels, offsets, n_inputs=len(times), **presentations)
 
 
-def _locked(array: NDArray[Any]) -> NDArray[Any]:
-    array.setflags(write=False)
-    return array
+def _n_inputs(task: Task | None) -> int | None:
+    """The width that the task asks for, where one is given; ValueError if it is none."""
+    if task is None:
+        return None
+    require_task(task)
+    return task.n_inputs
 
 
 def _raster(raster: ArrayLike, n_inputs: int | None) -> NDArray[Any]:
@@ -329,7 +333,7 @@ def _presentations(
     if lengths is not None:
         if ends is not None:
             raise ValueError("give either ends or lengths, got both")
-        if np.ndim(lengths) == 0:
+        if not hasattr(lengths, "__len__") or getattr(lengths, "shape", None) == ():
             length = whole("lengths", lengths, low=1, high=MAX_BINS)
         else:
             length = None

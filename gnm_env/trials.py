@@ -122,6 +122,10 @@ class Trials:
                 raise ValueError(f"{name} must be a dictionary, got {shown(value)}")
         self._metadata = _json("metadata", dict(metadata or {}))
         for name, column in (columns or {}).items():
+            if not isinstance(column, Iterable):
+                raise ValueError(
+                    f"column {name!r} must have one entry per trial, got {shown(column)}"
+                )
             entries = tuple(_json(f"column {name!r}", list(column)))
             if len(entries) != len(self):
                 raise ValueError(
@@ -249,7 +253,7 @@ class Trials:
 
         Columns that a part lacks are None there; of the metadata stays what all parts agree on.
         """
-        held = list(parts)
+        held = list(parts) if isinstance(parts, Iterable) else [parts]
         if not held or not all(isinstance(part, Trials) for part in held):
             raise ValueError(f"give at least one Trials to concatenate, got {shown(held)}")
         _require_equal("n_inputs", [part.n_inputs for part in held])
@@ -382,6 +386,8 @@ class Trials:
 
     def __getitem__(self, key: Any) -> Trial | Trials:
         if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
+            if not -len(self) <= key < len(self):
+                raise IndexError(f"there are {len(self):,} trials, got number {shown(key)}")
             return self._trial(range(len(self))[key])
         which = self._numbers(key)
         if len(which) == 0:
@@ -561,11 +567,11 @@ def _checked_list(trials: Iterable[Trial]) -> list[Trial]:
         held = list(trials)
     except TypeError:
         raise ValueError(f"trials must be a list of gnm_env.Trial, got {shown(trials)}") from None
-    wrong = next((trial for trial in held if not isinstance(trial, Trial)), None)
-    if wrong is not None or not held:
+    wrong = [trial for trial in held if not isinstance(trial, Trial)]
+    if wrong or not held:
         raise ValueError(
             "trials must be at least one gnm_env.Trial, got "
-            + (f"{shown(wrong)} among them" if held else "none")
+            + (f"{shown(wrong[0])} among them" if held else "none")
         )
     _require_equal("n_inputs", [trial.n_inputs for trial in held])
     return held

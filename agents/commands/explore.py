@@ -14,9 +14,11 @@ import asyncio
 import sys
 import webbrowser
 from typing import Any
+from urllib.parse import parse_qsl
 
 from agents.commands.terminal import Parser, Stopped, at_least
 from agents.registry import load_module
+from gnm_env.checks import whole
 
 PORT = 8765
 
@@ -37,9 +39,15 @@ def options(parser: Parser) -> None:
 def main(options: argparse.Namespace) -> dict[str, Any]:
     """Serve the page until Ctrl-C."""
     from agents.explorer.server import serve
+    from agents.explorer.settings import parse
 
     for module in options.modules:
         load_module(module)
+    link = dict(parse_qsl(options.link, keep_blank_values=True))
+    for state in (dict(parse_qsl(link.pop("versus", ""), keep_blank_values=True)), link):
+        parse(state)  # refuses what means nothing
+    if options.port is not None:
+        whole("--port", options.port, low=0, high=65_535)
 
     def ready(address: str) -> None:
         link = f"{address}?{options.link}" if options.link else address

@@ -9,12 +9,15 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import numbers
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gnm_env.checks import shown, whole
 
 Setting = dict[str, Any]
 """One neuron's settings by name, such as {"neuron": "gnm", "alpha": 0.3, "pattern_seed": 4}."""
@@ -41,8 +44,22 @@ class Axis:
     long_name: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not isinstance(self.values, tuple):
+            raise ValueError(
+                f"an axis needs a name and a tuple of values, got {shown(self.name)} and "
+                f"{shown(self.values)}"
+            )
         if not self.values:
             raise ValueError(f"axis {self.name} must have at least one value, got none")
+        if not all(isinstance(value, (str, bool, numbers.Real)) for value in self.values):
+            raise ValueError(
+                f"axis {self.name} must have numbers or names as values, got {shown(self.values)}"
+            )
+        whole(f"chunk of the axis {self.name}", self.chunk, low=0)
+        if not all(isinstance(setting, Mapping) for setting in self.settings):
+            raise ValueError(
+                f"axis {self.name} must have mappings in `settings`, got {shown(self.settings)}"
+            )
         if len(set(self.values)) < len(self.values):
             raise ValueError(f"axis {self.name} must not repeat a value, got {self.values}")
         if self.settings and len(self.settings) != len(self.values):

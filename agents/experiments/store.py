@@ -42,6 +42,7 @@ from agents.experiments.journal import (
     write_journal,
 )
 from agents.experiments.provenance import commit, software
+from gnm_env.files import path_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,13 +153,14 @@ def open_store(folder: Path, experiment: Experiment, *, repair: bool = False) ->
         yield Store(folder, experiment, {entry["block"] for entry in entries[1:]})
 
 
-def read(folder: Path, *, unfinished: bool = False) -> xr.Dataset:
+def read(folder: str | os.PathLike[str], *, unfinished: bool = False) -> xr.Dataset:
     """All results of a store, in memory. Raises StoreError if there is anything amiss.
 
     With `unfinished` a store may lack blocks; there the numbers are NaN or −1.
     """
     import xarray as xr
 
+    folder = path_of(folder, "read")
     journal = read_journal(folder)
     summary = _summary(journal)
     damaged = damaged_files(folder, [journal.known, *journal.blocks.values()])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -15,6 +15,8 @@ from agents.experiments.design import Axis, Block, Coordinate, Experiment, Setti
 from agents.experiments.models import new_agent
 from agents.registry import find_model, find_rule
 from gnm_env import Patterns, Task
+from gnm_env.checks import MAX_BINS, flag, shown, whole
+from gnm_env.task import MAX_CLASSES
 
 RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
 """The paper's training length and measure."""
@@ -117,6 +119,13 @@ def training(
     Raises:
         ValueError: if an axis has a name that nothing takes, or a value that is out of range.
     """
+    wrong = [axis for axis in axes if not isinstance(axis, Axis)]
+    if wrong or len({axis.name for axis in axes}) < len(axes):
+        raise ValueError(
+            "axes must each be an Axis with a name of its own, got "
+            + (shown(wrong[0]) if wrong else ", ".join(axis.name for axis in axes))
+        )
+    flag("keep_weights", keep_weights)
     common = {**RUN, "start": "matched", "rule": "all", "neuron": "gnm", **common}
     _check_names(axes, common, {"runs", "n_inputs"} if keep_weights else {"runs"})
     _check_values(axes, common)
@@ -201,19 +210,24 @@ def _check_values(axes: tuple[Axis, ...], common: Mapping[str, Any]) -> None:
                 f"the published initial weights are those of {', '.join(PUBLISHED_START)}, not of "
                 f"{setting['neuron']}: give initial_weight"
             )
+        for name in RUN:
+            whole(name, setting[name], low=1, high=MAX_BINS)
         make_agent(setting, task_of(setting))
 
 
 def pattern_seeds(seeds: Sequence[int]) -> Axis:
     """The axis of pattern seeds. Raises ValueError for seeds whose streams would overlap."""
-    outside = [seed for seed in seeds if not 0 <= seed <= LARGEST_SEED]
-    if outside:
-        raise ValueError(f"pattern seeds must be in 0 … {LARGEST_SEED}, got {outside[0]}")
+    if not isinstance(seeds, Iterable):
+        raise ValueError(f"pattern seeds must be whole numbers, got {shown(seeds)}")
+    for seed in seeds:
+        whole("pattern seeds", seed, 0, LARGEST_SEED)
     return Axis("pattern_seed", tuple(seeds), long_name="seed of patterns and initial weights")
 
 
 def class_counts(*counts: int) -> Axis:
     """The axis of tasks, by number of pattern classes."""
+    for count in counts:
+        whole("classes", count, low=1, high=MAX_CLASSES)
     return Axis("classes", counts, long_name="number of pattern classes")
 
 

@@ -25,7 +25,7 @@ from agents.rl.hyperparameters import HYPERPARAMETERS
 from agents.rl.observation import TRACE_SCALE, ObservationConfig
 from agents.rl.sb3_agent import SB3Agent
 from gnm_env.checks import choice
-from gnm_env.files import atomic_write
+from gnm_env.files import atomic_write, path_of
 from gnm_env.task import Patterns, Task
 
 FORMAT = 2
@@ -67,7 +67,7 @@ def describe(folder: str | os.PathLike[str], description: Description) -> None:
 
 def described(folder: str | os.PathLike[str]) -> Description:
     """What task.json says; ValueError if it is missing or damaged."""
-    path = Path(folder) / DESCRIPTION
+    path = path_of(folder, "read") / DESCRIPTION
     try:
         contents = json.loads(path.read_bytes())
         if contents["format"] not in (1, FORMAT):
@@ -87,7 +87,7 @@ def described(folder: str | os.PathLike[str]) -> Description:
             f"{folder} holds no RL agent, it has no {DESCRIPTION}; "
             "give the folder that scripts/train_rl.py or agents.rl.save wrote"
         ) from None
-    except (KeyError, TypeError, ValueError, IndexError, OSError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, OSError, RecursionError) as error:
         raise ValueError(
             f"{path} is not readable ({type(error).__name__}: {error}); train and save again"
         ) from None
@@ -147,7 +147,7 @@ def load(folder: str | os.PathLike[str]) -> tuple[SB3Agent, Task, Patterns]:
     you trust. Raises ValueError if a file is missing or damaged, or if they do not belong together:
     a model that was trained on other observations than task.json says is refused.
     """
-    place = Path(folder)
+    place = path_of(folder, "read")
     about = described(place)
     model = load_model(place / BEST if (place / BEST).exists() else place / MODEL, about.kind)
     return SB3Agent(model, about.task, about.observation), about.task, about.patterns

@@ -6,6 +6,7 @@ start near silence; the result is a plain SB3 model with its `learn`, `save` and
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -24,7 +25,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from agents.rl.observation import RAW, TRACES, ObservationConfig
 from agents.rl.vec_env import PatternVecEnv
 from gnm_env.checks import choice, real, whole
-from gnm_env.task import Patterns, Task
+from gnm_env.task import Patterns, Task, task_arrays
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,8 @@ def training_env(
         n_envs: their number; None: the kind's.
     """
     chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
+    choice("feedback", feedback, ("cost", "dense"))
+    task_arrays(task, patterns)  # refuses what does not belong together
     n_envs = chosen.n_envs if n_envs is None else whole("n_envs", n_envs, low=1)
     envs = gym.make_vec(
         "gnm/PatternTrial-v0",
@@ -212,6 +215,9 @@ def make_rl_agent(
     else:
         _require_observation(env, chosen.observation, kind)
         _require_spikes(env.action_space)
+    unknown = sorted(set(settings) - set(inspect.signature(chosen.algorithm).parameters))
+    if unknown:
+        raise ValueError(f"{chosen.algorithm.__name__} has no setting {unknown[0]!r}")
     n_envs = env.num_envs if isinstance(env, VecEnv) else 1
     keywords = {**chosen.settings(n_envs), "device": "cpu", **settings}
     model = chosen.algorithm(chosen.policy, env, seed=whole("seed", seed, low=0), **keywords)

@@ -11,6 +11,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from gnm_env.checks import shown, whole
+
 Indices = None | int | Iterable[int]
 
 
@@ -29,6 +31,8 @@ class PatternVecEnv(VecEnv):
     """
 
     def __init__(self, envs: VectorEnv[Any, Any, Any]) -> None:
+        if not isinstance(envs, VectorEnv):
+            raise ValueError(f"envs must be a Gymnasium vector environment, got {shown(envs)}")
         mode = envs.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
             raise ValueError(
@@ -51,6 +55,10 @@ class PatternVecEnv(VecEnv):
         self._reset_options()
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return self._own(observations)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seeds for the next reset: `seed` for the first environment, one more for each other."""
+        return super().seed(None if seed is None else whole("seed", seed, low=0))
 
     def step_async(self, actions: NDArray[Any]) -> None:
         self._actions = actions
@@ -83,9 +91,12 @@ class PatternVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """The attribute of the vector environment, once for each environment asked about."""
+        those = list(self._get_indices(indices))
+        if not all(-self.num_envs <= i < self.num_envs for i in those):
+            raise IndexError(f"there are {self.num_envs} environments, got indices {those}")
         if attr_name == "render_mode":
-            return [None for _ in self._get_indices(indices)]
-        return [self._attribute(attr_name) for _ in self._get_indices(indices)]
+            return [None for _ in those]
+        return [self._attribute(attr_name) for _ in those]
 
     def _attribute(self, name: str) -> Any:
         return getattr(self.envs if hasattr(self.envs, name) else self.envs.unwrapped, name)

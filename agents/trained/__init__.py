@@ -43,7 +43,7 @@ def names() -> list[str]:
 
 def pretrained(name: str) -> Checkpoint:
     """The trained agent `name`, with its task and patterns; ValueError if there is none."""
-    if name not in _table():
+    if not isinstance(name, str) or name not in _table():
         near = difflib.get_close_matches(str(name), names(), 1)
         hint = f", did you mean {near[0]!r}?" if near else ""
         raise ValueError(

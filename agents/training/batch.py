@@ -70,7 +70,6 @@ class AgentBatch:
                     f"agents must have as many inputs as the task, n_inputs = {source.n_inputs}, "
                     f"got {agent.n_inputs}"
                 )
-            agent.rule.check_source(source)
         model = first.model
         self._width = width_for(len(self._agents), model.widest)
         self._loops = loops(model, first.rule, self._width)

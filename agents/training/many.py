@@ -90,6 +90,10 @@ def train_many(
                 f"agents must be able to learn, but agent {places[0]} is a "
                 f"{type(agents[places[0]]).__name__}, which can only be scored"
             )
+        for place in places:  # not where they are scored, too: that asks nothing of a rule
+            rule = getattr(agents[place], "rule", None)
+            if rule is not None:
+                rule.check_source(source)
     history = History(
         error_rate=np.empty((0, len(agents))),
         mean_error=np.empty((0, len(agents))),

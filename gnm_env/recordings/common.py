@@ -56,6 +56,11 @@ class Spikes:
     n_inputs: int
 
 
+def checked_duration(duration: Any) -> float | None:
+    """The length of every trial, where one is given; ValueError if it is none."""
+    return None if duration is None else real("duration", duration, above=0.0)
+
+
 def binned_trials(
     spikes: Spikes,
     bin_width: float,
@@ -167,7 +172,7 @@ def resolved_labels(
     """The label of each trial; `known` is what a function is called with, `column` finds a name."""
     values: list[Any]
     if callable(label):
-        values = [label(what) for what in known]
+        values = [_by_function(label, k, what) for k, what in enumerate(known)]
     elif isinstance(label, str):
         values = list(column(label))
     else:
@@ -183,6 +188,17 @@ def resolved_labels(
             f"there must be one label for each of the {len(known)} trials, got {len(values)}"
         )
     return np.array([_whole_label(k, value) for k, value in enumerate(values)], np.int64)
+
+
+def _by_function(label: Callable[[Any], Any], k: int, what: Any) -> Any:
+    """The label of trial `k`, of which the function is told `what`."""
+    try:
+        return label(what)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"label must be a function that tells the label of a trial from what is known of it, "
+            f"but of trial {k}, {shown(what)}, it says: {error}"
+        ) from error
 
 
 def _whole_label(k: int, value: Any) -> int:

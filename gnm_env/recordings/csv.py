@@ -8,8 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from gnm_env.checks import whole
-from gnm_env.recordings.common import Label, Spikes, binned_trials, resolved_labels
+from gnm_env.checks import MAX_INPUTS, real, shown, whole
+from gnm_env.files import path_of
+from gnm_env.recordings.common import (
+    Label,
+    Spikes,
+    binned_trials,
+    checked_duration,
+    resolved_labels,
+)
 from gnm_env.trials import Trials
 
 
@@ -45,12 +52,13 @@ def from_csv(
     alphabetical order, which `metadata["channels"]` tells. Raises ValueError, naming the line, if
     anything does not fit.
     """
+    bin_width, duration = real("bin_width", bin_width, above=0.0), checked_duration(duration)
     rows = _rows(path, delimiter)
     names, trial = _numbered([row.get("trial", "") for row in rows])
     channel, channel_names = _channels([row["channel"] for row in rows], n_inputs)
     time = np.array([_number(path, k, row["time"]) for k, row in enumerate(rows)])
     labels = resolved_labels(label, names, lambda name: _column(path, rows, trial, name))
-    last = max(time.max(), bin_width) if duration is None else float(duration)
+    last = max(time.max(), bin_width) if duration is None else duration
     most = len(channel_names) or int(channel.max()) + 1
     spikes = Spikes(
         trial,
@@ -66,8 +74,14 @@ def from_csv(
 
 
 def _rows(path: str | os.PathLike[str], delimiter: str) -> list[dict[str, str]]:
+    if not isinstance(delimiter, str) or len(delimiter) != 1:
+        raise ValueError(f"delimiter must be one character, got {shown(delimiter)}")
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
+        file = open(path_of(path, "read"), newline="", encoding="utf-8-sig")  # noqa: SIM115
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
+        raise ValueError(f"{shown(path)} cannot be read as a table: {error}") from None
+    try:
+        with file:
             reader = csv.DictReader(file, delimiter=delimiter, skipinitialspace=True)
             found = reader.fieldnames or []
             if not {"channel", "time"} <= set(found):
@@ -97,8 +111,10 @@ def _channels(
     entries: list[str], n_inputs: int | None
 ) -> tuple[np.ndarray[Any, np.dtype[np.int64]], list[str]]:
     """The channel of each spike, and the names of channels where they have names."""
-    if all(entry.strip().isdecimal() and len(entry) < 12 for entry in entries):
-        return np.array([int(entry) for entry in entries], np.int64), []
+    if all(entry.strip().removeprefix("-").isdecimal() for entry in entries):
+        # More digits than any channel has would say nothing more.
+        numbers = [whole("channel", int(entry[:20]), 0, MAX_INPUTS - 1) for entry in entries]
+        return np.array(numbers, np.int64), []
     names = sorted(set(entries))
     return np.array([names.index(entry) for entry in entries], np.int64), names
 

@@ -8,8 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gnm_env.checks import MAX_INPUTS, shown, whole
-from gnm_env.recordings.common import Label, Spikes, binned_trials, resolved_labels
+from gnm_env.checks import MAX_INPUTS, real, shown, whole
+from gnm_env.recordings.common import (
+    Label,
+    Spikes,
+    binned_trials,
+    checked_duration,
+    resolved_labels,
+)
 from gnm_env.trials import Trials
 
 
@@ -39,7 +45,12 @@ def from_events(
 
     Raises ValueError if events lie outside the sensor, or anything else does not fit.
     """
+    bin_width, duration = real("bin_width", bin_width, above=0.0), checked_duration(duration)
     width, height, polarities = _checked_size(sensor_size)
+    if not isinstance(recordings, Iterable):
+        raise ValueError(
+            f"recordings must be structured arrays, one for each trial, got {shown(recordings)}"
+        )
     events = [_checked_events(k, events) for k, events in enumerate(recordings)]
     if not events:
         raise ValueError("there must be at least one recording, got none")
@@ -54,7 +65,7 @@ def from_events(
     if duration is None:
         durations = np.array([max(t.max(initial=0.0), bin_width) for t in times])
     else:
-        durations = np.full(len(times), float(duration))
+        durations = np.full(len(times), duration)
     spikes = Spikes(
         np.repeat(np.arange(len(events)), [len(its) for its in events]),
         np.concatenate(channels),
@@ -88,6 +99,11 @@ def _checked_events(k: int, events: Any) -> NDArray[Any]:
             f"recording {k} must be a structured array (events,) with a field t, "
             f"got {shown(events)}"
         )
+    for name in {"t", "x", "y", "p"} & set(names):
+        if events.dtype[name].kind not in "biuf":
+            raise ValueError(
+                f"recording {k} must have numbers as {name}, got {events.dtype[name]} values"
+            )
     return events
 
 

@@ -6,9 +6,18 @@ import os
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gnm_env.checks import whole
-from gnm_env.recordings.common import Label, Spikes, binned_trials, library, resolved_labels
+from gnm_env.checks import real, whole
+from gnm_env.files import path_of
+from gnm_env.recordings.common import (
+    Label,
+    Spikes,
+    binned_trials,
+    checked_duration,
+    library,
+    resolved_labels,
+)
 from gnm_env.trials import Trials
 
 
@@ -37,13 +46,15 @@ def from_hdf5(
     ValueError if an array is missing or does not fit; ImportError without h5py.
     """
     h5py = library("h5py", "hdf5")
+    bin_width, duration = real("bin_width", bin_width, above=0.0), checked_duration(duration)
+    path = path_of(path, "read")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
         raise ValueError(f"{path} cannot be read as an HDF5 file: {error}") from None
     with file:
-        times = [np.asarray(row, np.float64) for row in _array(h5py, file, "spikes/times")]
-        units = [np.asarray(row, np.int64) for row in _array(h5py, file, "spikes/units")]
+        times = _rows(h5py, file, "spikes/times", np.float64)
+        units = _rows(h5py, file, "spikes/units", np.int64)
         columns = {
             name: _array(h5py, file, key).tolist()
             for name, key in (("label", "labels"), ("speaker", "extra/speaker"))
@@ -67,7 +78,7 @@ def from_hdf5(
     if duration is None:
         durations = np.array([max(row.max(initial=0.0), bin_width) for row in times])
     else:
-        durations = np.full(len(times), float(duration))
+        durations = np.full(len(times), duration)
     spikes = Spikes(
         np.repeat(np.arange(len(times)), counts),
         channel,
@@ -81,4 +92,18 @@ def from_hdf5(
 def _array(h5py: Any, file: Any, name: str) -> Any:
     if not isinstance(file.get(name), h5py.Dataset):
         raise ValueError(f"the HDF5 file has no array {name!r}")
+    if file[name].ndim != 1:
+        raise ValueError(
+            f"{name!r} must have one entry for each trial, got the shape {file[name].shape}"
+        )
     return file[name][:]
+
+
+def _rows(h5py: Any, file: Any, name: str, dtype: type) -> list[NDArray[Any]]:
+    try:
+        rows: list[NDArray[Any]] = [np.asarray(row, dtype) for row in _array(h5py, file, name)]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name!r} must be a row of numbers for each trial: {error}") from None
+    if any(row.ndim != 1 for row in rows):
+        raise ValueError(f"{name!r} must be a row of numbers for each trial, got single numbers")
+    return rows

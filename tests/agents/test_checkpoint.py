@@ -306,6 +306,8 @@ def rewritten(path: Path, arrays: dict[str, Any] | None = None, **header: Any) -
         ({}, {"model": {"name": "gnm", "parameters": {"alpha": 7.0}}}, "alpha must be in 0 … 1"),
         ({}, {"model": {"name": "gnm", "parameters": {"omega": 7.0}}}, "omega"),
         ({}, {"rule": None}, "rule"),
+        ({}, {"rule": "all"}, "does not name the class of its rule, but 'all"),
+        ({}, {"agent": [1]}, r"does not name the class of its agent, but \[1\]"),
         ({}, {"n_inputs": 5}, "weights and velocity must have length 5"),
         ({}, {"trials": -1}, "how far"),
         ({}, {"weight_bounds": [1.0, 0.0]}, "lowest < highest"),

@@ -15,6 +15,7 @@ from agents import (
     MST,
     AggregateLabel,
     NeuronAgent,
+    Tempotron,
     answers,
     bootstrap_interval,
     mistake_rate,
@@ -388,3 +389,11 @@ def test_a_recording_needs_an_agent_and_a_trial(agent: Any) -> None:
         record(agent, trial)
     with pytest.raises(ValueError, match=r"trial must be a gnm_env.Trial, got"):
         record(easy_agent(), agent)
+
+
+def test_who_learned_from_few_labels_is_scored_on_all_of_them() -> None:
+    """A rule may refuse to learn from a task; to score what it made asks nothing of it."""
+    agent = NeuronAgent(GNM(), Tempotron(), BUSY.n_inputs)
+    assert max(BUSY.owed) > 1
+    assert noisy_performance(agent, BUSY, BUSY_PATTERNS, runs=2, cap=20, seed=1).shape == (2,)
+    assert answers(agent, BUSY, BUSY_PATTERNS, trials=5).wrong.shape == (1,)

@@ -7,6 +7,7 @@ house must not move them. Neurons with a readout, a reset, a Hill function of ev
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from agents import GNM, LIF, MST, AggregateLabel, ErrorTrace, NeuronAgent, train
 from agents.learning.rule import Rule
 from agents.neurons.neuron import Neuron
 from gnm_env import Patterns, Task
+from tests.marks import EXHAUSTIVE
 
 TASK = Task(
     n_inputs=37, pattern_bins=13, rate=0.03, n_classes=3, targets=(2, 0, 3), background_bins=40,
@@ -47,8 +49,18 @@ DIGESTS = {
     "MST": ("035392a5990c5b00", "6313064246e07117", "ff1845bfe53988ba"),
 }
 QUICK = {("V", "ALL"), ("D", "ET"), ("whole exponent", "ALL"), ("LIF", "ET modulated")}
+SLOW = {("infinite exponent", "ALL"), ("real exponent", "ET"), ("MST", "ET modulated")}
+"""With the quick ones every kind of neuron and every rule; the exhaustive tests take every pair."""
+
+
+def marks(neuron: str, rule: str) -> Any:
+    if (neuron, rule) in QUICK:
+        return ()
+    return pytest.mark.slow if (neuron, rule) in SLOW else EXHAUSTIVE
+
+
 CELLS = [
-    pytest.param(neuron, rule, digest, marks=() if (neuron, rule) in QUICK else pytest.mark.slow)
+    pytest.param(neuron, rule, digest, marks=marks(neuron, rule))
     for neuron, digests in DIGESTS.items()
     for rule, digest in zip(RULES, digests, strict=True)
 ]

@@ -1,7 +1,8 @@
 """The standard loop, train_many alone, side by side, on threads, in pieces: one and the same bits.
 
-Compiling every neuron × rule × width takes minutes; the quick tests take each neuron, each rule and
-each width at least once, and the slow ones all that is left.
+Compiling every neuron × rule × width takes tens of minutes; the quick tests take each neuron, each
+rule and each width at least once, the slow ones some pairs of a neuron and a rule more, and the
+exhaustive ones all that is left.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from agents.learning.rule import Rule
 from agents.neurons.neuron import Neuron
 from gnm_env import Patterns, Task
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, BUSY_WEIGHT, trial_env
+from tests.marks import EXHAUSTIVE
 
 TRIALS = 150
 """About 7,000 bins: compiled code draws them in more than one batch."""
@@ -70,6 +72,20 @@ QUICK = {
 }
 """Numbers of lanes that the quick tests take; they share kernels with tests elsewhere."""
 
+SLOW = {
+    ("lif", "all"): 2,
+    ("gnm-h7.3", "et"): 7,
+    ("gnm-step", "all"): 64,
+    ("mst", "et-modulated"): 64,
+}
+"""The number of lanes that the slow tests take for some pairs more; exhaustive ones take all."""
+
+
+def marks(neuron: str, rule: str, lanes: int) -> Any:
+    if lanes in QUICK.get((neuron, rule), ()):
+        return ()
+    return pytest.mark.slow if SLOW.get((neuron, rule)) == lanes else EXHAUSTIVE
+
 
 def cells(lanes: tuple[int, ...]) -> list[Any]:
     """One test parameter per neuron, rule and number of lanes."""
@@ -79,7 +95,7 @@ def cells(lanes: tuple[int, ...]) -> list[Any]:
             rule,
             n,
             id=f"{neuron}-{rule}-{n}",
-            marks=() if n in QUICK.get((neuron, rule), ()) else pytest.mark.slow,
+            marks=marks(neuron, rule, n),
         )
         for neuron, rule in CELLS
         for n in lanes

@@ -98,6 +98,18 @@ def test_bad_arguments_are_told(tmp_path: Path) -> None:
         play(agent(), TASK, PATTERNS, tmp_path / "watch.gif", hears="noise")
     with pytest.raises(ValueError, match="no frame"):
         play(agent(), TASK, PATTERNS, tmp_path / "watch.gif", bins=2, every=5)
+    with pytest.raises(ValueError, match=r"a GIF of 500,000,000 frames needs .* GiB"):
+        play(agent(), TASK, PATTERNS, tmp_path / "watch.gif", bins=10**9)
+    with pytest.raises(ValueError, match="cannot write 3: a path must be text"):
+        play(agent(), TASK, PATTERNS, 3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"fps must be in 0\.01 … 1000"):
+        play(agent(), TASK, PATTERNS, tmp_path / "watch.gif", fps=1e300)
+    with pytest.raises(ValueError, match=r"patterns must be gnm_env\.Patterns, got None"):
+        play(agent(), TASK, None, tmp_path / "watch.gif")  # type: ignore[arg-type]
+    for nobody in (None, 3, GNM()):
+        with pytest.raises(ValueError, match="an agent must have a method predict"):
+            play(nobody, TASK, PATTERNS, tmp_path / "watch.gif")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_shows_a_saved_agent(tmp_path: Path) -> None:

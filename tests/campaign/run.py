@@ -22,11 +22,12 @@ sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 from tests.campaign.inputs import Case, cases  # noqa: E402  after the path
 from tests.campaign.pool import run_cases  # noqa: E402
 
-PARTS = ("inputs", "configurations", "kills", "flips")
+PARTS = ("inputs", "configurations", "environments", "kills", "flips")
 OUTCOMES = ("refused", "fine", "nonsense", "foreign", "crash", "hang")
 EVERY = {"small": 25, "full": 1}
 """Every how many-th bad input is tried."""
-CONFIGURATIONS = {"small": 3, "full": 500}
+CONFIGURATIONS = {"small": 6, "full": 500}
+ENVIRONMENTS = {"small": 40, "full": 2000}
 KILLS = {"small": 6, "full": 100}
 FLIPS = {"small": (30, 20), "full": (300, 200)}
 
@@ -43,11 +44,12 @@ Result = tuple[Case, str, str]
 
 
 def bad_inputs(
-    every: int, jobs: int, timeout: float, owner: str = "", file: Path | None = None
+    every: int, jobs: int, timeout: float, owner: str = "", file: Path | None = None, first: int = 0
 ) -> list[Result]:
     """Every `every`-th case of an owner; what is wrong is kept in `file` while it goes on."""
     everything = cases()
-    chosen = [n for n, case in enumerate(everything) if case.owner.startswith(owner)][::every]
+    numbered = list(enumerate(everything))[first:]
+    chosen = [n for n, case in numbered if case.owner.startswith(owner)][::every]
 
     def judged(outcomes: dict[int, tuple[str, str]]) -> list[Result]:
         return [(everything[n], verdict(everything[n], o), s) for n, (o, s) in outcomes.items()]
@@ -94,8 +96,12 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--size", choices=EVERY, default="small", help="default: %(default)s")
     parser.add_argument("--only", choices=PARTS, action="append", help="default: all parts")
-    parser.add_argument("--count", type=int, help="of configurations, kills; default: by the size")
+    parser.add_argument("--count", type=int, help="of configurations, environments, kills")
+    parser.add_argument(
+        "--pairs", type=int, default=0, help="of a neuron and a rule; 0: every rule is in one"
+    )
     parser.add_argument("--owner", default="", help="bad inputs to these files alone, by prefix")
+    parser.add_argument("--first", type=int, default=0, help="bad inputs from this number on")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (default 1)")
     parser.add_argument(
         "--timeout", type=float, default=120.0, help="seconds per input (default 120)"
@@ -117,17 +123,20 @@ def main() -> int:
         start = time.monotonic()
         if part == "inputs":
             results = bad_inputs(
-                EVERY[options.size], options.jobs, options.timeout, options.owner, options.findings
-            )
+                EVERY[options.size], options.jobs, options.timeout, options.owner,
+                options.findings, options.first,
+            )  # fmt: skip
             counts = Counter(outcome for _, outcome, _ in results)
             print(table(results))
             sound = not any(counts[name] for name in ("foreign", "crash", "hang"))
             sound &= counts["nonsense"] <= 0.01 * len(results)
         else:
             if part == "configurations":
-                counts = configurations.campaign(
-                    options.count or CONFIGURATIONS[options.size], options.seed
-                )
+                count = options.count or CONFIGURATIONS[options.size]
+                counts = configurations.campaign(count, options.seed, options.pairs)
+            elif part == "environments":
+                count = options.count or ENVIRONMENTS[options.size]
+                counts = configurations.campaign(count, options.seed, part="environments")
             elif part == "kills":
                 count = options.count or KILLS[options.size]
                 counts = kills.campaign(count, options.seed)

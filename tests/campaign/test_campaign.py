@@ -20,8 +20,13 @@ def test_no_bad_input_crashes_hangs_or_ends_in_somebody_elses_traceback() -> Non
 
 
 def test_random_configurations_give_the_same_in_every_loop_within_all_bounds() -> None:
-    counts = configurations.campaign(run.CONFIGURATIONS["small"], seed=0)
+    counts = configurations.campaign(run.CONFIGURATIONS["small"], seed=0, pairs=1)
     assert counts == {"tried": run.CONFIGURATIONS["small"], "wrong": 0}
+
+
+def test_vector_environments_give_what_single_ones_give_within_all_bounds() -> None:
+    counts = configurations.campaign(run.ENVIRONMENTS["small"], seed=0, part="environments")
+    assert counts == {"tried": run.ENVIRONMENTS["small"], "wrong": 0}
 
 
 def test_a_kill_while_saving_loses_nothing_and_leaves_nothing() -> None:

@@ -178,6 +178,16 @@ class TestPatterns:
         with pytest.raises(ValueError, match=r"drawing patterns of shape .* needs .* GiB"):
             Patterns.draw(Task(n_inputs=10**8, pattern_bins=10**6), 0)
 
+    def test_too_large_for_the_memory_are_refused_before_they_are_looked_at(self) -> None:
+        with pytest.raises(ValueError, match=r"patterns of shape .* GiB"):
+            Patterns.from_dense(np.broadcast_to(np.int8(0), (10**6, 10**6, 100)))
+
+    def test_cannot_be_changed_after_they_were_checked(self) -> None:
+        patterns = Patterns.draw(Task(rate=0.5), 0)
+        for array in (patterns.channels, patterns.offsets):
+            with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+                array.setflags(write=True)
+
     def test_must_be_drawn_for_a_task(self) -> None:
         with pytest.raises(ValueError, match=r"task must be a gnm_env\.Task, got None"):
             Patterns.draw(None, 0)  # type: ignore[arg-type]

@@ -38,6 +38,8 @@ def test_arrays_of_a_trial_cannot_be_changed() -> None:
     trial = draw_trial(TASK, Patterns.draw(TASK, 0), np.random.default_rng(1))
     for array in (trial.channels, trial.offsets, trial.onsets, trial.classes, trial.targets):
         assert not array.flags.writeable
+        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+            array.setflags(write=True)
 
 
 def test_attributes_of_a_trial_cannot_be_replaced() -> None:
@@ -203,6 +205,9 @@ class TestOnlyTheLabel:
             ({"onsets": [1], "targets": [1], "ends": [2], "lengths": 1}, "got both"),
             ({"onsets": [1], "targets": [1], "lengths": 0}, "lengths must be >= 1, got 0"),
             ({"onsets": [1], "targets": [1], "lengths": [1, 2]}, "onsets and lengths must have"),
+            ({"onsets": [1], "targets": [1], "lengths": [[1], [1, 2]]}, "lengths must be a row"),
+            ({"onsets": [1], "targets": [1], "lengths": 2.5}, "lengths must be a whole number"),
+            ({"onsets": [1], "classes": [0], "task": 3}, "task must be a gnm_env.Task, got 3"),
         ],
     )
     def test_or_else_all_must_be_said(self, keywords: Any, why: str) -> None:
@@ -282,6 +287,7 @@ class TestFromDense:
             (RASTER[:0], [], [], "bins >= 1"),
             (RASTER * 2, [], [], "binary"),
             (RASTER * 0.5, [], [], "binary"),
+            (RASTER * 1j, [], [], "binary"),
             (RASTER, [1, 5], [0], "one entry per presentation each, got 2 and 1"),
             (RASTER, [-1], [0], "onsets must lie in 0 …"),
             (RASTER, [10], [0], "within the trial's 12 bins, number 0 has onset 10 and end 13"),

@@ -169,11 +169,13 @@ class TestADataSet:
             ([], {}, "at least one gnm_env.Trial, got none"),
             (None, {}, "a list of gnm_env.Trial, got None"),
             ([1], {}, "got 1 among them"),
+            ([Trial.from_dense([[1]], label=0), None], {}, "got None among them"),
             ([Trial.from_dense([[1]], label=0), Trial.from_dense([[1, 0]], label=0)], {},
              "all must have the same n_inputs, got 1 and, at place 1, 2"),
             (random_trials(), {"n_classes": 1}, "n_classes must be more than the largest class"),
             (random_trials(), {"n_classes": 2**40}, "n_classes must be at most"),
             (random_trials(), {"columns": {"a": [1]}}, "one entry per trial, 20, got 1"),
+            (random_trials(), {"columns": {"a": 3}}, "one entry per trial, got 3"),
             (random_trials(), {"columns": {"a": [object()] * 20}}, "column 'a' must be JSON"),
             (random_trials(), {"columns": [1]}, "columns must be a dictionary"),
             (random_trials(), {"metadata": {"a": {1, 2}}}, "metadata must be JSON"),
@@ -254,7 +256,7 @@ class TestPartsOfIt:
 
     @pytest.mark.parametrize("i", [20, -21, 2**70])
     def test_there_is_none_beyond_the_last(self, i: int) -> None:
-        with pytest.raises(IndexError):
+        with pytest.raises(IndexError, match="there are 20 trials, got number"):
             self.TRIALS[i]
 
     @pytest.mark.parametrize(

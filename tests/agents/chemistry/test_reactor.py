@@ -10,6 +10,7 @@ import pytest
 
 from agents.chemistry import Course, ReactionNetwork, Reactor
 from agents.continuous import ContinuousGNM, InputSpikes, simulate
+from tests.marks import timed
 
 pytest.importorskip("roadrunner")
 pytest.importorskip("libsbml")
@@ -131,7 +132,7 @@ def full_size(bins: int = 250) -> tuple[Reactor, InputSpikes]:
     return Reactor(ReactionNetwork(0.3 * rng.random(100), alpha=0.2)), spikes
 
 
-@pytest.mark.slow
+@timed
 def test_a_hundred_runs_of_500_molecules_take_half_a_minute_at_most() -> None:
     reactor, spikes = full_size()
     began = time.process_time()

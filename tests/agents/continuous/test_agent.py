@@ -33,6 +33,7 @@ from agents.learning.rule import Rule
 from gnm_env import Patterns, Task, Trial, draw_trial
 from gnm_env.sampling import append_piece
 from gnm_env.task import task_arrays
+from tests.marks import timed
 
 TASK = Task(n_inputs=30, n_classes=2, rate=0.02, pattern_bins=20, background_bins=40)
 PATTERNS = Patterns.draw(TASK, seed=4)
@@ -288,7 +289,7 @@ def test_two_classes_come_to_give_one_and_two() -> None:
     assert np.median(within, axis=0).max() <= 0.15
 
 
-@pytest.mark.slow
+@timed
 @pytest.mark.parametrize("rule", RULES, ids=["all", "et", "et modulated"])
 def test_sixty_thousand_trials_take_a_second_at_most(rule: Rule) -> None:
     task = Task(n_classes=2)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 
@@ -32,13 +33,20 @@ def test_the_last_axis_runs_fastest() -> None:
         ((), (), "axis a must have at least one value"),
         ((1, 1), (), "axis a must not repeat a value"),
         ((1, 2), ({"b": 1},), "one mapping in `settings` per value, got 1 for 2 values"),
+        ((1,), (3,), "axis a must have mappings in `settings`"),
+        (3, (), "an axis needs a name and a tuple of values, got 'a' and 3"),
+        (([1],), (), "axis a must have numbers or names as values"),
     ],
 )
-def test_an_axis_that_makes_no_sense_is_refused(
-    values: tuple[int, ...], settings: tuple[dict[str, int], ...], complaint: str
-) -> None:
+def test_an_axis_that_makes_no_sense_is_refused(values: Any, settings: Any, complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         Axis("a", values, settings=settings)
+
+
+@pytest.mark.parametrize("chunk", [-1, 0.5, "x", None])
+def test_a_block_takes_a_whole_number_of_values(chunk: Any) -> None:
+    with pytest.raises(ValueError, match="chunk of the axis a must be"):
+        Axis("a", (1, 2), chunk)
 
 
 @pytest.mark.parametrize("size", SIZES)

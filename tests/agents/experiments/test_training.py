@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -89,14 +91,33 @@ def test_an_axis_is_checked_against_every_neuron_that_it_meets() -> None:
         (Axis("start", ("matched", "warm")), {}, "start must be matched or published"),
         (Axis("neuron", ("gnm", "gmn")), {}, "no neuron 'gmn'"),
         (Axis("runs", (10, 20)), {}, "runs cannot be set by an axis"),
+        (Axis("trials", (0,)), {}, "trials must be >= 1, got 0"),
+        (Axis("alpha", (0.1,)), {"runs": 2.5}, "runs must be a whole number, got 2.5"),
+        (Axis("alpha", (0.1,)), {"cap": "x"}, "cap must be a whole number, got 'x'"),
+        (Axis("alpha", (0.1,)), {"rule": 3}, "a rule must be given by its name, .* got 3"),
+        (Axis("alpha", (0.1,)), {"keep_weights": "no"}, "keep_weights must be True or False"),
+        (Axis("classes", (1,)), {}, "an Axis with a name of its own, got classes, "),
+        (3, {}, "an Axis with a name of its own, got 3"),
         (Axis("alpha", (0.1,)), {"neuron": "continuous", "start": "published"}, "published init"),
     ],
 )
 def test_values_out_of_range_are_refused_when_they_are_declared(
-    axis: Axis, common: dict[str, object], complaint: str
+    axis: Any, common: dict[str, Any], complaint: str
 ) -> None:
     with pytest.raises(ValueError, match=complaint):
         training("mine", "", (*AXES, axis), **common)
+
+
+@pytest.mark.parametrize("counts", [(0,), (2.5,), ("3",), (None,), (True,), (10**30,)])
+def test_a_number_of_classes_is_a_whole_number(counts: Any) -> None:
+    with pytest.raises(ValueError, match="classes must be"):
+        class_counts(*counts)
+
+
+@pytest.mark.parametrize("seeds", [3, None, "x", (0.5,), (-1,)])
+def test_pattern_seeds_are_whole_numbers(seeds: Any) -> None:
+    with pytest.raises(ValueError, match="pattern seeds must be"):
+        pattern_seeds(seeds)
 
 
 def test_classes_and_pattern_seeds_are_asked_for() -> None:

@@ -6,6 +6,7 @@ compiled and in an agent, on some neurons quickly and on the others in the slow 
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -30,6 +31,7 @@ from tests.agents.learning.table import (
     trial_for,
 )
 from tests.agents.worlds import play
+from tests.marks import EXHAUSTIVE
 
 CLOSE: dict[str, float] = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -51,14 +53,41 @@ QUICK = {
 """Neurons that the quick tests take with each rule."""
 
 
+SLOW = {
+    "critical": "mst_slow",
+    "critical-amount": "mst_slow",
+    "mpdal": "gnm_reads_D",
+    "tempotron": "mst_slow",
+    "peak-error": "lif",
+    "peak-error-first": "lif",
+    "surrogate": "gnm_reads_D",
+    "surrogate-triangle": "gnm",
+    "surrogate-count": "gnm_reads_D",
+    "resume": "lif",
+    "resume-even": "lif_pauses",
+    "psd": "gnm_recovers",
+    "psd-even": "gnm_recovers",
+    "span": "lif_pauses",
+    "span-even": "lif",
+    "chronotron": "mst_slow",
+    "chronotron-even": "mst",
+    "chronotron-i": "mst_slow",
+    "stdp": "gnm_recovers",
+    "mstdpet": "gnm_forgets",
+}
+"""One neuron more with each rule, mostly of a kind for which the rule is compiled elsewhere; the
+exhaustive tests take all."""
+
+
+def marks(rule: str, neuron: str) -> Any:
+    if neuron in QUICK.get(rule, ("gnm",)):
+        return ()
+    return pytest.mark.slow if SLOW[rule] == neuron else EXHAUSTIVE
+
+
 def cells() -> list[Any]:
     return [
-        pytest.param(
-            rule,
-            neuron,
-            id=f"{rule}-{neuron}",
-            marks=() if neuron in QUICK.get(rule, ("gnm",)) else pytest.mark.slow,
-        )
+        pytest.param(rule, neuron, id=f"{rule}-{neuron}", marks=marks(rule, neuron))
         for rule in RULES
         for neuron in NEURONS
     ]
@@ -212,9 +241,14 @@ def test_what_a_trial_of_ten_bins_teaches_is_as_by_hand(
         ("critical", "gnm"),
         ("critical-amount", "mst"),
         *(
-            pytest.param(name, neuron, marks=pytest.mark.slow)
-            for name in ("critical", "critical-amount", "mpdal")
-            for neuron in ("gnm", "gnm_forgets", "lif", "mst", "mst_slow")
+            pytest.param(name, neuron, marks=EXHAUSTIVE if k % 5 else pytest.mark.slow)
+            for k, (name, neuron) in enumerate(
+                itertools.product(
+                    ("critical", "critical-amount", "mpdal"),
+                    ("lif", "gnm", "gnm_forgets", "mst", "mst_slow"),
+                )
+            )
+            if (name, neuron) not in (("critical", "gnm"), ("critical-amount", "mst"))
         ),
     ],
 )

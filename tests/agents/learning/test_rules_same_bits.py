@@ -31,6 +31,7 @@ from agents.training.source import Source, source_of
 from gnm_env import Patterns, Task, Trials, draw_trial
 from tests.agents.learning.table import RULES
 from tests.agents.worlds import BUSY, BUSY_PATTERNS, play, trial_env
+from tests.marks import EXHAUSTIVE
 
 TRIALS = 120
 
@@ -60,17 +61,36 @@ QUICK = {
 }
 
 
+SLOW = {
+    "mpdal": "gnm-d",
+    "tempotron": "mst",
+    "peak-error-first": "lif",
+    "surrogate-triangle": "gnm-d",
+    "surrogate-count": "mst",
+    "resume": "lif",
+    "psd": "gnm-h200",
+    "span": "lif",
+    "chronotron": "gnm",
+    "chronotron-i": "gnm-h200",
+}
+"""The neuron on which the slow tests take a rule that the quick ones leave out; the exhaustive
+tests take all."""
+
+
+def marks(rule: str, neuron: str) -> Any:
+    if (rule, neuron) in QUICK:
+        return ()
+    return pytest.mark.slow if SLOW.get(rule) == neuron else EXHAUSTIVE
+
+
 def cells() -> list[Any]:
-    """One test parameter per rule and neuron; most of them slow, for they take long to compile."""
+    """One test parameter per rule and neuron."""
     return [
-        pytest.param(
-            rule, neuron, id=f"{rule}-{neuron}",
-            marks=() if (rule, neuron) in QUICK else pytest.mark.slow,
-        )
+        pytest.param(rule, neuron, id=f"{rule}-{neuron}", marks=marks(rule, neuron))
         for rule in MADE
         for neuron in NEURONS
         if rule != "policy-gradient" or neuron in ("gnm", "gnm-h200")
-    ]  # fmt: skip
+    ]
 
 
 @cache
@@ -139,7 +159,7 @@ def test_side_by_side_each_ends_with_the_bits_that_it_has_alone(rule: str, neuro
     ("rule", "neuron"),
     [
         ("critical", "gnm"),
-        *(pytest.param(*cell.values, marks=pytest.mark.slow) for cell in cells()[1:]),
+        *(pytest.param(*cell.values, marks=EXHAUSTIVE) for cell in cells()[1:]),
     ],
 )
 def test_over_threads_and_in_blocks_of_lanes_too(rule: str, neuron: str) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agents import GNM, ErrorTrace, NeuronAgent, noisy_performance, train_many
 from agents.network import BackPropagation, Network, NetworkAgent
 from gnm_env import Patterns, Task
+from tests.marks import timed
 
 TRIALS = 60_000
 HELD_OUT = 1_000_000
@@ -55,7 +56,7 @@ def test_two_classes_are_learned_better_than_by_one_neuron_and_on_every_seed() -
     assert np.sum(network <= SILENCE) <= 2
 
 
-@pytest.mark.slow
+@timed
 def test_sixty_thousand_trials_of_one_class_take_at_most_six_seconds_of_one_core() -> None:
     """Measured: 2.1 s."""
     task, patterns = world(1, 0)

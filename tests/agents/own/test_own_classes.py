@@ -206,3 +206,18 @@ def test_the_command_line_takes_them(tmp_path: Path) -> None:
     saved = load_checkpoint(json.loads(ended.stdout.splitlines()[-1])["checkpoint"]).agent
     assert (type(saved.neuron), type(saved.rule)) == (ALIF, Tempotron)
     assert saved.neuron.alpha == 0.2
+
+
+@pytest.mark.parametrize("spec", [None, 3, b"gnm"])
+def test_what_names_no_class_is_refused(spec: Any) -> None:
+    for find in (find_neuron, find_rule):
+        with pytest.raises(ValueError, match="must be given by its name, or as module:Class"):
+            find(spec)
+    with pytest.raises(ValueError, match=r"cannot import \.x: give the module's whole name"):
+        find_neuron(".x:A")
+
+
+@pytest.mark.parametrize("neuron", [3, "gnm", GNM])
+def test_a_rule_is_tried_on_a_neuron(neuron: Any) -> None:
+    with pytest.raises(ValueError, match="neuron must be an instance of a class derived from Neur"):
+        check_rule(AggregateLabel(), neuron)

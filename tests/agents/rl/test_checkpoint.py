@@ -98,6 +98,12 @@ def test_a_model_of_another_algorithm_is_refused(folder, tmp_path, model):
         load(folder)
 
 
+@pytest.mark.parametrize("place", [None, 3, object()])
+def test_what_is_no_path_is_refused(place):
+    with pytest.raises(ValueError, match="a path must be text"):
+        load(place)
+
+
 def test_missing_files_are_refused_by_name(folder, tmp_path):
     with pytest.raises(ValueError, match="holds no RL agent"):
         load(tmp_path)

@@ -67,6 +67,12 @@ def test_a_single_environment_is_seen_through_traces():
         (lambda: make_rl_agent("sarsa", gym.make("gnm/PatternTrial-v0")), "kind must be one of"),
         (lambda: training_env(TASK, PATTERNS, n_envs=0), "n_envs must be >= 1"),
         (lambda: training_env(TASK, PATTERNS, feedback="loud"), "feedback must be one of"),
+        (lambda: training_env(TASK, PATTERNS, feedback="sign"), "feedback must be one of"),
+        (lambda: training_env(TASK, None), "patterns must be gnm_env.Patterns, got None"),
+        (
+            lambda: make_rl_agent("ppo", training_env(TASK, PATTERNS, n_envs=2), bogus=1),
+            "PPO has no setting 'bogus'",
+        ),
         (lambda: make_rl_agent("ppo", 3), "env must be a Gymnasium Env or an SB3 VecEnv"),
         (
             lambda: make_rl_agent(

@@ -157,6 +157,22 @@ def test_another_way_to_reset_is_refused() -> None:
         PatternVecEnv(envs)
 
 
+def test_only_vector_environments_are_adapted() -> None:
+    with pytest.raises(ValueError, match="must be a Gymnasium vector environment, got None"):
+        PatternVecEnv(None)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", [-1, "x", 2.5])
+def test_a_seed_is_a_whole_number(seed: Any) -> None:
+    with pytest.raises(ValueError, match="seed must be"):
+        adapted(IDS[0], 2).seed(seed)
+
+
+def test_there_are_no_attributes_of_an_environment_that_is_not_there() -> None:
+    with pytest.raises(IndexError, match=r"there are 3 environments, got indices \[7\]"):
+        adapted(IDS[0], 3).get_attr("task", 7)
+
+
 def test_attributes_are_those_of_the_vector_environment() -> None:
     env = adapted(IDS[0], 3)
     assert [task.n_inputs for task in env.get_attr("task")] == [100] * 3

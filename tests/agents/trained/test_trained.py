@@ -28,3 +28,9 @@ def test_an_agent_scores_the_very_bins_that_are_published(name: str) -> None:
 def test_a_name_that_there_is_not_is_told_with_the_nearest() -> None:
     with pytest.raises(ValueError, match="no trained agent 'gnm-critic-2', did you mean 'gnm-crit"):
         pretrained("gnm-critic-2")
+
+
+@pytest.mark.parametrize("name", [None, 3, [], "../x"])
+def test_what_is_no_name_is_refused(name: object) -> None:
+    with pytest.raises(ValueError, match="there is no trained agent"):
+        pretrained(name)  # type: ignore[arg-type]

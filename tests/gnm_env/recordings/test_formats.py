@@ -192,9 +192,13 @@ class TestHDF5:
             (dict(duration=0.04), "channel 3 has 0.0405 after the start of trial 0"),
             (dict(label="words"), "no array 'words'"),
             (dict(bin_width=0.0), "bin_width must be"),
+            (dict(bin_width="1"), "bin_width must be a number, got '1'"),
+            (dict(duration=[1]), r"duration must be a number, got \[1\]"),
+            (dict(label=lambda word: int("x")), "of trial 0, .* it says: invalid literal"),
+            (dict(path=3), "cannot read 3: a path must be text"),
         ]:
             with pytest.raises(ValueError, match=why):
-                from_hdf5(path, **{"bin_width": 0.01, **arguments})  # type: ignore[arg-type]
+                from_hdf5(**{"path": path, "bin_width": 0.01, **arguments})  # type: ignore[arg-type]
         with pytest.raises(ValueError, match="cannot be read as an HDF5 file"):
             from_hdf5(tmp_path / "none.h5", bin_width=0.01)
         with h5py.File(path, "r+") as file:
@@ -235,6 +239,10 @@ class TestEvents:
             (dict(sensor_size=(10**5, 10**5, 1)), "number of channels must be at most"),
             (dict(recordings=[]), "at least one recording"),
             (dict(recordings=[np.zeros(3)]), "recording 0 must be a structured array"),
+            (dict(recordings=3), "recordings must be structured arrays, .* got 3"),
+            (dict(recordings=[np.zeros(2, [("t", "U3")])]), "must have numbers as t, got <U3"),
+            (dict(bin_width=None), "bin_width must be a number, got None"),
+            (dict(duration="1"), "duration must be a number, got '1'"),
             (dict(label="class"), "label must be a function or a number"),
             (dict(label=5), "label must be a function, the name"),
             (dict(duration=100.0), "must lie within their trial"),
@@ -317,6 +325,8 @@ class TestCSV:
                 "must lie within their trial|must last longer|must be at most",
             ),
             ("channel,time\n0,-1\n", "channel 0 has -1"),
+            ("channel,time\n-1,1\n", "channel must be >= 0, got -1"),
+            (f"channel,time\n{10**30},1\n", "channel must be at most 99,999,999"),
             (
                 "channel,time,label\n0,1,1\n0,2,2\n",
                 "line 3 of .* must have '1' in the column 'label'",
@@ -329,6 +339,26 @@ class TestCSV:
         label: Any = "label" if "label" in text else [1]
         with pytest.raises(ValueError, match=why):
             from_csv(path, bin_width=1.0, label=label)
+
+    @pytest.mark.parametrize(
+        ("arguments", "why"),
+        [
+            (dict(path=None), "cannot read None: a path must be text"),
+            (dict(path=3), "cannot read 3: a path must be text"),  # not the file that is open as 3
+            (dict(path="a\0b"), "null byte"),
+            (dict(delimiter=""), "delimiter must be one character, got ''"),
+            (dict(delimiter=None), "delimiter must be one character, got None"),
+            (dict(bin_width="1"), "bin_width must be a number, got '1'"),
+            (dict(duration=True), "duration must be a number, got True"),
+        ],
+    )
+    def test_says_which_argument_is_wrong(
+        self, tmp_path: Path, arguments: dict[str, Any], why: str
+    ) -> None:
+        (tmp_path / "a.csv").write_text("channel,time\n0,1\n")
+        good = dict(path=tmp_path / "a.csv", bin_width=1.0, label=[1])
+        with pytest.raises(ValueError, match=why):
+            from_csv(**{**good, **arguments})  # type: ignore[arg-type]
 
     def test_says_when_there_is_no_file(self, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="cannot be read as a table"):
