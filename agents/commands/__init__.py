@@ -30,7 +30,7 @@ VERBS = {
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",
     "figures": "draw the paper's figures from finished experiments",
-    "report": "judge the paper's claims and write the report",
+    "report": "place agents of your own in the league; or judge the paper's claims",
     "reference-table": "print every neuron and rule on one to four classes",
     "league": "neurons, network and RL agents in one table",
     "speech": "hear a word in speech, told only how often it was said",

@@ -15,6 +15,7 @@ from agents.experiments.design import Axis, Block, Coordinate, Experiment, Setti
 from agents.experiments.models import new_agent
 from agents.registry import find_model, find_rule
 from gnm_env import Patterns, Task
+from gnm_env.levels import evaluation_seed
 
 RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
 """The paper's training length and measure."""
@@ -45,11 +46,6 @@ _OWN = {"neuron", "rule", "start", "initial_weight", "weight_bounds"}
 def training_seed(classes: Any, pattern_seed: Any) -> Any:
     """Seed of the training stream; far from every seed of an evaluation."""
     return 1_000_000 + 10_000 * classes + pattern_seed
-
-
-def evaluation_seed(classes: Any, pattern_seed: Any) -> Any:
-    """Seed of evaluation run 0. Run k hears the stream of this seed + k; runs stay below 1000."""
-    return 10_000_000 * classes + 1_000 * pattern_seed
 
 
 def task_of(setting: Mapping[str, Any]) -> Task:
