@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from gnm_env.checks import real, shown, whole, whole_array
 from gnm_env.files import atomic_write
 from gnm_env.levels import VERSION, Level, suite
+from gnm_env.trial_task.env import PatternTrialEnv
+from gnm_env.trial_task.vector import PatternTrialVectorEnv
 from gnm_env.wrappers import SeededEpisodes
 
 __all__ = ["Recorder", "Result", "Score", "read_result", "read_results"]
@@ -254,7 +256,6 @@ class Recorder:
     Attributes:
         level, pattern_seed: what is learned.
         seed: of the first stream of a score.
-        heard: bins heard so far.
 
     Raises:
         ValueError: if an argument is not what it should be.
@@ -274,30 +275,44 @@ class Recorder:
         self.level = suite()[level.name if isinstance(level, Level) else level]
         self.pattern_seed = whole("pattern seed", pattern_seed, low=0)
         self.seed = self.level.evaluation_seed(self.pattern_seed)
-        self.heard = 0
+        self._watched: list[_WatchedEnv | _WatchedEnvs] = []
         self._learner, self._parameters, self._command = learner, parameters, command
         self._scores: list[Score] = []
         self._result((Score(0, 0.0, (0,) * suite().runs),))  # refuses bad arguments now, not later
         self._since: float | None = None
         self._seconds = 0.0
 
-    def watch(self, env: Any) -> Any:
-        """`env`, single or vector, as it is, its bins counted.
+    @property
+    def heard(self) -> int:
+        """Bins heard so far in the environments that are watched."""
+        return sum(env.heard for env in self._watched)
 
-        Raises ValueError if it is not one of this level and these patterns.
+    def watch(self, env: Any) -> Any:
+        """`env`, single or vector, as it is, its bins counted; training time counts from here on.
+
+        Raises ValueError if it is not `level.trial_env(pattern_seed)`, or `trial_envs`, wrapped or
+        not.
         """
         bare = env.unwrapped
         task, patterns = getattr(bare, "task", None), getattr(bare, "patterns", None)
-        if task != self.level.task or patterns != self.level.patterns(self.pattern_seed):
+        trial = isinstance(bare, (PatternTrialEnv, PatternTrialVectorEnv))
+        if (
+            not trial
+            or task != self.level.task
+            or patterns != self.level.patterns(self.pattern_seed)
+        ):
             raise ValueError(
                 f"the environment must be {self.level.trial_id} with pattern_seed = "
-                f"{self.pattern_seed}, got another task or other patterns; "
+                f"{self.pattern_seed}, got another; "
                 f"make it with suite()[{self.level.name!r}].trial_env({self.pattern_seed})"
             )
-        return (_WatchedEnvs if isinstance(env, VectorEnv) else _WatchedEnv)(env, self)
+        watched = _WatchedEnvs(env) if isinstance(env, VectorEnv) else _WatchedEnv(env)
+        self._watched.append(watched)
+        self.begin()
+        return watched
 
     def begin(self) -> None:
-        """Training begins, or goes on: its time counts from here. The first reset calls it."""
+        """Training begins, or goes on after a score: its time counts from here."""
         if self._since is None:
             self._since = time.perf_counter()
 
@@ -326,6 +341,8 @@ class Recorder:
         result = self._result((*kept, score))
         path = result.write(self._folder)
         self._scores = list(result.scores)
+        if self._watched:
+            self.begin()
         return path
 
     def streams(self) -> gym.Env[Any, Any]:
@@ -350,41 +367,52 @@ class Recorder:
 
 
 class _WatchedEnv(gym.Wrapper[Any, Any, Any, Any]):
-    """Counts the bins of one environment."""
+    """Counts the bins of one environment: trial by trial, since a step is soon done."""
 
-    def __init__(self, env: gym.Env[Any, Any], recorder: Recorder) -> None:
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
-        self._recorder = recorder
-        self._step = env.step
+        self.step = env.step  # type: ignore[method-assign]  # no call more than without it
+        self._bare: Any = env.unwrapped
+        self._earlier = -self._bare.n_answered
+
+    @property
+    def heard(self) -> int:
+        """Bins answered so far."""
+        return int(self._earlier + self._bare.n_answered)
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
-        self._recorder.begin()
-        return self.env.reset(**arguments)
-
-    def step(self, action: Any) -> Any:
-        self._recorder.heard += 1
-        return self._step(action)
+        answered = self._bare.n_answered
+        told = self.env.reset(**arguments)
+        self._earlier += answered
+        return told
 
 
 class _WatchedEnvs(VectorWrapper[Any, Any, Any, Any, Any]):
     """Counts the bins of environments side by side; a step that only resets one is no bin."""
 
-    def __init__(self, env: VectorEnv[Any, Any, Any], recorder: Recorder) -> None:
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         super().__init__(env)
-        self._recorder = recorder
+        self._step = env.step
+        self._bare: Any = env.unwrapped
         self._skips = env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP
-        self._resets = 0
+        self._steps = self._ended = self._last_ended = 0
+
+    @property
+    def heard(self) -> int:
+        """Bins answered so far, by all together."""
+        return self._steps * self.num_envs - (self._ended - self._last_ended)
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
-        self._recorder.begin()
-        self._resets = 0
+        self._ended, self._last_ended = self._ended - self._last_ended, 0
         return self.env.reset(**arguments)
 
     def step(self, actions: Any) -> Any:
-        told = self.env.step(actions)
-        self._recorder.heard += self.num_envs - self._resets
+        told = self._step(actions)
+        self._steps += 1
         if self._skips:
-            self._resets = int(np.count_nonzero(told[2] | told[3]))
+            # The environments know it; a look at the arrays would take a tenth of a step.
+            self._last_ended = self._bare.n_done
+            self._ended += self._last_ended
         return told
 
 

@@ -50,6 +50,11 @@ def test_bins_of_a_single_environment_are_counted(tmp_path: Path) -> None:
     while not env.step(0)[2]:
         bins += 1
     assert record.heard == bins
+    env.reset()
+    assert record.heard == bins
+    env.step(0)
+    env.reset()  # before the end of the trial
+    assert record.heard == bins + 1
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
@@ -82,6 +87,7 @@ def test_an_environment_of_another_task_or_other_patterns_is_not_watched(tmp_pat
     for env in (
         suite()["2class"].trial_env(100),
         suite()["1class"].trial_env(101),
+        suite()["1class"].stream_env(100),
         gym.make("gnm/PatternTrial-1class-v0", pattern_seed=100, rate=0.1),
     ):
         with pytest.raises(ValueError, match="must be gnm/PatternTrial-1class-v0 with pattern_se"):
