@@ -26,6 +26,7 @@ VERBS = {
     "show": "draw how a neuron works",
     "explore": "move sliders in the browser and see a neuron learn anew",
     "watch": "see a saved agent answer, in a window or as a GIF or MP4",
+    "card": "write a model card with a replay beside a saved agent",
     "train-rl": "train a Stable-Baselines3 agent on the aggregate label",
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",
