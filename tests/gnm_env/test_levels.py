@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -92,3 +93,10 @@ def test_the_streams_of_the_league_are_its_own() -> None:
 def test_the_fields_of_a_level_go_into_a_file() -> None:
     for level in LEVELS:
         assert Task(**json.loads(json.dumps(dict(level.fields)))) == level.task
+
+
+def test_the_page_lists_every_level_with_its_fields() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "environments" / "suite.md").read_text("utf-8")
+    for level in LEVELS:
+        fields = ", ".join(f"`{name}={value!r}`" for name, value in level.fields.items())
+        assert f"| `{level.name}` | {level.about} | {fields} |" in page
