@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -372,7 +372,7 @@ class _WatchedEnv(gym.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
         self.step = env.step  # type: ignore[method-assign]  # no call more than without it
-        self._bare: Any = env.unwrapped
+        self._bare = cast(Any, env.unwrapped)
         self._earlier = -self._bare.n_answered
 
     @property

@@ -155,7 +155,7 @@ def training_env(
     )
     made: Any = VecMonitor(PatternVecEnv(chosen.observation.wrap(envs)))
     made.observation_config = chosen.observation  # make_rl_agent compares it
-    return made  # type: ignore[no-any-return]
+    return made
 
 
 def make_rl_agent(
