@@ -1,10 +1,12 @@
 """Spike patterns hidden in noise, as Gymnasium environments with the aggregate label as feedback.
 
-Importing this package registers `gnm/PatternTrial-v0` and `gnm/PatternStream-v0`.
+Importing this package registers `gnm/PatternTrial-v0`, `gnm/PatternStream-v0`, and both for every
+level of `suite()`.
 """
 
 from gymnasium.envs.registration import register
 
+from gnm_env.levels import Level, register_levels, suite
 from gnm_env.rules import MAX_EPISODE_BINS
 from gnm_env.stream_task.env import PatternStreamEnv
 from gnm_env.task import Patterns, Task
@@ -16,6 +18,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "__version__",
+    "Level",
     "PatternStreamEnv",
     "PatternTrialEnv",
     "Patterns",
@@ -23,6 +26,7 @@ __all__ = [
     "Trial",
     "Trials",
     "draw_trial",
+    "suite",
 ]
 
 register(
@@ -36,3 +40,4 @@ register(
     vector_entry_point="gnm_env.stream_task.vector:PatternStreamVectorEnv",
     max_episode_steps=MAX_EPISODE_BINS,
 )
+register_levels()

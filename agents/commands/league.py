@@ -33,6 +33,7 @@ def options(parser: Parser) -> None:
     add("--steps", type=at_least(1), metavar="N", help="bins that RL agents hear, to try it out")
     share(parser, "--out", help=f"(default {RESULTS}/league/SIZE)")
     add("--so-far", action="store_true", help="train nothing: print and draw what is finished")
+    add("--keep", action="store_true", help="keep the table as the one that gnm report shows")
     share(parser, "--repair")
 
 
@@ -52,4 +53,8 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     table = rows(results)
     print(text_table(table))
     pictures = draw(results, folder)
+    if options.keep:
+        from agents.suite.league import keep
+
+        print(f"kept in {keep(table)}")
     return {"table": table, "pictures": [str(path) for path in pictures], "store": str(folder)}

@@ -16,6 +16,7 @@ from agents.experiments.models import new_agent
 from agents.registry import find_model, find_rule
 from gnm_env import Patterns, Task
 from gnm_env.checks import MAX_BINS, flag, shown, whole
+from gnm_env.levels import evaluation_seed
 from gnm_env.task import MAX_CLASSES
 
 RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
@@ -47,11 +48,6 @@ _OWN = {"neuron", "rule", "start", "initial_weight", "weight_bounds"}
 def training_seed(classes: Any, pattern_seed: Any) -> Any:
     """Seed of the training stream; far from every seed of an evaluation."""
     return 1_000_000 + 10_000 * classes + pattern_seed
-
-
-def evaluation_seed(classes: Any, pattern_seed: Any) -> Any:
-    """Seed of evaluation run 0. Run k hears the stream of this seed + k; runs stay below 1000."""
-    return 10_000_000 * classes + 1_000 * pattern_seed
 
 
 def task_of(setting: Mapping[str, Any]) -> Task:

@@ -18,8 +18,10 @@ from agents.rl.hyperparameters import (
     HYPERPARAMETERS,
     Hyperparameters,
     make_rl_agent,
+    read_hyperparameters,
     training_env,
 )
+from agents.rl.memory import LeakyPolicy, LstmPolicy
 from agents.rl.observation import RAW, TRACES, ObservationConfig
 from agents.rl.sb3_agent import SB3Agent
 from agents.rl.vec_env import PatternVecEnv
@@ -29,11 +31,14 @@ __all__ = [
     "RAW",
     "TRACES",
     "Hyperparameters",
+    "LeakyPolicy",
+    "LstmPolicy",
     "ObservationConfig",
     "PatternVecEnv",
     "SB3Agent",
     "load",
     "make_rl_agent",
+    "read_hyperparameters",
     "save",
     "training_env",
 ]

@@ -1,15 +1,20 @@
 """Hyperparameters: Stable-Baselines3's algorithms, each with the settings that this task needs.
 
-Nothing here is an algorithm. `make_rl_agent` calls SB3's constructor and gives the last layer a
-start near silence; the result is a plain SB3 model with its `learn`, `save` and `predict`.
+They stand in `hyperparameters.toml` beside this file. Nothing here is an algorithm:
+`make_rl_agent` calls SB3's constructor and gives the last layer a start near silence; the result is
+a plain SB3 model with its `learn`, `save` and `predict`.
 """
 
 from __future__ import annotations
 
+import copy
 import inspect
 import math
+import os
+import tomllib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -22,36 +27,94 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
-from agents.rl.observation import RAW, TRACES, ObservationConfig
+from agents.rl.memory import LeakyPolicy, LstmPolicy
+from agents.rl.observation import ObservationConfig
 from agents.rl.vec_env import PatternVecEnv
 from gnm_env.checks import choice, real, whole
 from gnm_env.task import Patterns, Task, task_arrays
 
+FILE = Path(__file__).with_suffix(".toml")
+"""Every kind's hyperparameters: none of them stands in code."""
+
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
+    algorithm.__name__: algorithm for algorithm in (PPO, RecurrentPPO, DQN)
+}
+OWN_POLICIES: dict[str, type[Any]] = {
+    policy.__name__: policy for policy in (LstmPolicy, LeakyPolicy)
+}
+"""Policies that SB3 does not know by name."""
+
+_FALLING = "lin_"
+
 
 @dataclass(frozen=True)
 class Hyperparameters:
-    """Those of one kind of agent.
+    """Those of one kind of agent, from `hyperparameters.toml`.
 
     Attributes:
         algorithm: SB3's class.
-        policy: SB3's name of the policy.
+        policy: SB3's name of the policy, or a policy of this package.
         observation: what the policy is shown.
         n_envs: environments side by side.
         settings: keywords of the algorithm, for a number of environments.
     """
 
     algorithm: type[BaseAlgorithm]
-    policy: str
+    policy: str | type[Any]
     observation: ObservationConfig
     n_envs: int
     settings: Callable[[int], dict[str, Any]]
 
 
-ROLLOUT = 16_384
-"""Bins that PPO hears between two updates: 55 to 80 trials, each with one number to learn from."""
+def read_hyperparameters(path: str | os.PathLike[str] = FILE) -> dict[str, Hyperparameters]:
+    """The kinds of agents that a file describes; its own beginning says how.
 
-MINIBATCHES = 8
-"""Parts into which a rollout is cut for stochastic gradient steps."""
+    Raises ValueError, naming the kind and what is wrong, if the file is missing or damaged, or says
+    what no algorithm takes.
+    """
+    place = Path(path)
+    try:
+        kinds = tomllib.loads(place.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"cannot read the hyperparameters {place}: {error.strerror}") from None
+    except ValueError as error:
+        raise ValueError(f"{place} is no TOML file of hyperparameters: {error}") from None
+    made = {}
+    for kind, table in kinds.items():
+        try:
+            made[kind] = _from_table(dict(table))
+        except KeyError as error:
+            raise ValueError(f"{place}, [{kind}]: {error.args[0]} is missing") from None
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{place}, [{kind}]: {error}") from None
+    return made
+
+
+def _from_table(table: dict[str, Any]) -> Hyperparameters:
+    name = choice("algorithm", table.pop("algorithm"), tuple(ALGORITHMS))
+    policy = table.pop("policy")
+    observation = ObservationConfig.of(table.pop("observation"))
+    n_envs = whole("n_envs", table.pop("n_envs"), low=1)
+    known = inspect.signature(ALGORITHMS[name]).parameters
+    unknown = sorted(set(table) - set(known) - {"rollout", "minibatches"})
+    if unknown:
+        raise ValueError(f"{name} takes no {unknown[0]!r}")
+
+    def settings(n_envs: int) -> dict[str, Any]:
+        made: dict[str, Any] = copy.deepcopy(table)
+        if "rollout" in made:
+            made |= _rollout(n_envs, made.pop("rollout"), made.pop("minibatches"))
+        rate = made["learning_rate"]
+        if isinstance(rate, str):
+            if not rate.startswith(_FALLING):
+                raise ValueError(f'learning_rate must be a number or "lin_0.003", got {rate!r}')
+            made["learning_rate"] = LinearSchedule(float(rate.removeprefix(_FALLING)), 0.0, 1.0)
+        return made
+
+    settings(n_envs)  # refuses now, not later
+    return Hyperparameters(
+        ALGORITHMS[name], OWN_POLICIES.get(policy, policy), observation, n_envs, settings
+    )
 
 
 def _rollout(n_envs: int, bins: int, minibatches: int) -> dict[str, Any]:
@@ -60,65 +123,7 @@ def _rollout(n_envs: int, bins: int, minibatches: int) -> dict[str, Any]:
     return {"n_steps": n_steps, "batch_size": n_steps * n_envs // minibatches}
 
 
-def _ppo(n_envs: int) -> dict[str, Any]:
-    return {
-        **_rollout(n_envs, ROLLOUT, MINIBATCHES),
-        "n_epochs": 3,
-        "learning_rate": LinearSchedule(3e-3, 0.0, 1.0),
-        "gamma": 1.0,
-        "gae_lambda": 1.0,
-        "ent_coef": 0.01,
-        "policy_kwargs": {"net_arch": {"pi": [64, 64], "vf": []}},
-    }
-
-
-def _linear(n_envs: int) -> dict[str, Any]:
-    return {
-        **_ppo(n_envs),
-        **_rollout(n_envs, ROLLOUT, MINIBATCHES // 2),
-        "learning_rate": LinearSchedule(1e-2, 0.0, 1.0),
-        "policy_kwargs": {"net_arch": []},
-    }
-
-
-def _recurrent(n_envs: int) -> dict[str, Any]:
-    return {
-        **_ppo(n_envs),
-        **_rollout(n_envs, 2 * ROLLOUT, 4),
-        "n_epochs": 4,
-        "learning_rate": LinearSchedule(2e-3, 0.0, 1.0),
-        "policy_kwargs": {
-            "net_arch": [],
-            "lstm_hidden_size": 32,
-            "shared_lstm": True,
-            "enable_critic_lstm": False,
-        },
-    }
-
-
-def _dqn(n_envs: int) -> dict[str, Any]:
-    return {
-        "learning_rate": LinearSchedule(1e-3, 0.0, 1.0),
-        "buffer_size": 200_000,
-        "learning_starts": 10_000,
-        "batch_size": 256,
-        "gamma": 0.99,
-        "train_freq": 4,
-        "gradient_steps": 4,
-        "target_update_interval": 2_000,
-        "exploration_initial_eps": 0.02,
-        "exploration_final_eps": 0.002,
-        "exploration_fraction": 0.5,
-        "policy_kwargs": {"net_arch": [64, 64]},
-    }
-
-
-HYPERPARAMETERS: dict[str, Hyperparameters] = {
-    "ppo": Hyperparameters(PPO, "MlpPolicy", TRACES, 64, _ppo),
-    "ppo-linear": Hyperparameters(PPO, "MlpPolicy", TRACES, 64, _linear),
-    "recurrent-ppo": Hyperparameters(RecurrentPPO, "MlpLstmPolicy", RAW, 256, _recurrent),
-    "dqn": Hyperparameters(DQN, "MlpPolicy", TRACES, 16, _dqn),
-}
+HYPERPARAMETERS: dict[str, Hyperparameters] = read_hyperparameters()
 
 
 def training_env(
@@ -150,7 +155,9 @@ def training_env(
         feedback=feedback,
         autoreset_mode=gym.vector.AutoresetMode.SAME_STEP,
     )
-    return VecMonitor(PatternVecEnv(chosen.observation.wrap(envs)))
+    made: Any = VecMonitor(PatternVecEnv(chosen.observation.wrap(envs)))
+    made.observation_config = chosen.observation  # make_rl_agent compares it
+    return made
 
 
 def make_rl_agent(
@@ -168,7 +175,7 @@ def make_rl_agent(
     - *A start near silence.* The last layer begins with weights × 0.1 and a bias by which the
       policy spikes with `spike_probability` per bin. A fresh policy spikes in every other bin, a
       hundred times too often: it would first have to unlearn that, from one number per trial.
-    - *Synaptic traces*, except for the LSTM: a pattern cannot be told from single bins.
+    - *Synaptic traces*, except for policies with a memory: single bins do not tell a pattern.
     - *The last action and a trace of the own spikes*: what is owed depends on what was given.
     - *A learning rate that falls to 0*: the score forgives no mistake in 10,000 bins, so the last
       noise of the gradient has to go.
@@ -183,8 +190,10 @@ def make_rl_agent(
       settling too early: without it most patterns of two classes are never told apart.
     - "ppo-linear": the same without hidden layers: spikes where a weighted sum of traces is high,
       the nearest relative of the neurons here. With so few weights larger steps are safe.
-    - "recurrent-ppo": an LSTM on the raw bits, which has to find its own traces. More environments
-      and larger batches, since SB3 walks through its sequences bin by bin.
+    - "recurrent-ppo": an LSTM on the bits of the present bin and the last action, which has to find
+      its own traces; see `agents.rl.memory` for its start.
+    - "leaky-ppo": leaky integrators whose decays are learned in the LSTM's place, below a layer of
+      64 units: a state-space model, and the traces of "ppo" inside of the policy.
     - "dqn": learns from dense feedback only. Under "cost" the return depends on the number of
       spikes so far, which no trace tells: the values of an observation then are not defined.
 
@@ -240,10 +249,13 @@ def _require_observation(env: Any, observation: ObservationConfig, kind: str) ->
         raise ValueError(
             f"env must be a Gymnasium Env or an SB3 VecEnv, got {type(env).__name__}{hint}"
         )
-    if observation.raw_bits == np.issubdtype(env.observation_space.dtype, np.floating):
+    shown = getattr(env, "observation_config", observation)
+    floats = np.issubdtype(env.observation_space.dtype, np.floating)
+    if shown != observation or observation.raw_bits == floats:
+        got = shown if shown != observation else env.observation_space
         raise ValueError(
-            f"{kind} needs {'the raw bits' if observation.raw_bits else 'traces'} as observations, "
-            f"got {env.observation_space}; training_env(task, patterns, {kind!r}) gives them"
+            f"{kind} needs {observation} as observations, got {got}; "
+            f"training_env(task, patterns, {kind!r}) gives them"
         )
 
 

@@ -18,6 +18,8 @@ from markdown_docstrings import is_plain_data
 from public_names import ROOTS, Public, public_modules, public_names, unique
 from sphinx.application import Sphinx
 
+from gnm_env.levels import LEVELS
+
 NAMESPACE = "gnm"
 INHERITED_FROM_OTHERS = (
     "object, tuple, dict, Exception, Env, Wrapper, VectorEnv, VectorWrapper, ABC, Module"
@@ -25,9 +27,14 @@ INHERITED_FROM_OTHERS = (
 
 
 def specs() -> list[EnvSpec]:
-    """The environments that `import gnm_env` registers."""
+    """The environments that `import gnm_env` registers, without those of the suite's levels.
+
+    Levels are the same environments with keywords; one page lists them.
+    """
     importlib.import_module("gnm_env")
-    return [spec for spec in gym.registry.values() if spec.namespace == NAMESPACE]
+    levels = {id for level in LEVELS for id in (level.trial_id, level.stream_id)}
+    own = (spec for spec in gym.registry.values() if spec.namespace == NAMESPACE)
+    return [spec for spec in own if spec.id not in levels]
 
 
 def page_name(spec: EnvSpec) -> str:

@@ -321,6 +321,11 @@ class PatternVectorEnv(HasParams, VectorEnv[Bits, NDArray[Any], NDArray[Any]]):
         finally:
             self._entry.release()
 
+    @property
+    def n_done(self) -> int:
+        """Number of environments whose episode the last step has ended."""
+        return self._n_done
+
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
         """Where to reset."""
         mask = checked_options(options, ("reset_mask",)).get("reset_mask")

@@ -106,6 +106,7 @@ class PatternTrialEnv(HasTrialParams, PatternEnv):
         self._order: NDArray[np.int64] | None = None
         """Numbers of the trials of this epoch, in their order; None: an epoch is to begin."""
         self._n_heard = 0
+        self._n_bins = 0
         self._ahead: list[NDArray[np.int8]] = []
         """The bins not yet shown, the next one last; empty while no trial is under way."""
 
@@ -121,6 +122,11 @@ class PatternTrialEnv(HasTrialParams, PatternEnv):
         self._seed(seed)
         self._begin(given["trial"] if "trial" in given else self._next_trial())
         return self._ahead.pop(), {}
+
+    @property
+    def n_answered(self) -> int:
+        """Bins of this trial that have been answered; 0 before the first."""
+        return self._n_bins - len(self._ahead)
 
     def _next_trial(self) -> Trial:
         """The next trial of the epoch, or one that is drawn."""
@@ -161,6 +167,7 @@ class PatternTrialEnv(HasTrialParams, PatternEnv):
         # that rows handed out earlier stay as they were.
         self._raster = dense(arrays.channels, arrays.offsets, trial.n_inputs, silent_bins=1)
         self._ahead = list(self._raster[::-1])
+        self._n_bins = trial.n_bins
         self._emitted: float = 0.0 if self._graded else 0
         # The segments are followed bin by bin only for dense feedback and for pictures.
         self._follows = self.feedback == "dense" or self._scroll is not None

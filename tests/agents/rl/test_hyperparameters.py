@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -12,13 +15,19 @@ import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import DQN, PPO
 
-from agents.rl import HYPERPARAMETERS, TRACES, make_rl_agent, training_env
-from agents.rl.hyperparameters import n_parameters
+from agents.rl import HYPERPARAMETERS, TRACES, make_rl_agent, read_hyperparameters, training_env
+from agents.rl.hyperparameters import FILE, n_parameters
 from gnm_env import Patterns, Task
 
 TASK = Task()
 PATTERNS = Patterns.draw(TASK, 0)
-CLASSES = {"ppo": PPO, "ppo-linear": PPO, "recurrent-ppo": RecurrentPPO, "dqn": DQN}
+CLASSES = {
+    "ppo": PPO,
+    "ppo-linear": PPO,
+    "recurrent-ppo": RecurrentPPO,
+    "leaky-ppo": RecurrentPPO,
+    "dqn": DQN,
+}
 
 
 @pytest.mark.parametrize("kind", HYPERPARAMETERS)
@@ -78,7 +87,7 @@ def test_a_single_environment_is_seen_through_traces():
             lambda: make_rl_agent(
                 "recurrent-ppo", training_env(TASK, PATTERNS, "ppo", n_envs=2)
             ),
-            "needs the raw bits",
+            r"recurrent-ppo needs ObservationConfig\(decays=\(1.0,\).*got Obs.*decays=\(0.3,\)",
         ),
         (
             lambda: make_rl_agent("ppo", gym.make("gnm/PatternTrial-v0"), spike_probability=0.0),
@@ -116,3 +125,48 @@ def test_the_target_network_of_a_dqn_does_not_count():
 def test_every_kind_gives_its_reasons():
     for kind in HYPERPARAMETERS:
         assert f'- "{kind}": ' in (make_rl_agent.__doc__ or "")
+
+
+def test_the_kinds_are_those_of_the_file():
+    assert list(read_hyperparameters()) == list(HYPERPARAMETERS)
+    assert all(f"[{kind}]" in FILE.read_text(encoding="utf-8") for kind in HYPERPARAMETERS)
+
+
+@pytest.mark.parametrize("kind", HYPERPARAMETERS)
+def test_what_the_file_says_is_what_the_model_has(kind):
+    env = training_env(TASK, PATTERNS, kind, n_envs=4)
+    model = make_rl_agent(kind, env)
+    chosen = HYPERPARAMETERS[kind]
+    settings = chosen.settings(4)
+    for name in ("gamma", "batch_size", "ent_coef", "n_epochs", "gradient_steps"):
+        assert getattr(model, name, None) == settings.get(name), name
+    assert model.lr_schedule(1.0) == settings["learning_rate"](1.0)
+    assert model.lr_schedule(0.0) == 0.0
+    assert chosen.settings(4)["policy_kwargs"] == model.policy_kwargs | {}
+    if "n_steps" in settings:
+        assert settings["n_steps"] * 4 == 16_384
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.replace('algorithm = "PPO"', 'algorithm = "SAC"'), "algorithm must be one of"),
+        (lambda t: t.replace("gamma", "gama"), r"\[ppo\]: PPO takes no 'gama'"),
+        (lambda t: t.replace("n_envs = 64\n", "", 1), r"\[ppo\]: n_envs is missing"),
+        (lambda t: t.replace("lin_0.003", "cos_0.003"), "learning_rate must be a number or"),
+        (lambda t: t.replace("decays = [0.3]", "decays = [7]"), "decays must be in 0 … 1"),
+        (lambda t: t + "[", "is no TOML file"),
+    ],
+)
+def test_a_file_that_says_what_nothing_takes_is_refused(
+    tmp_path: Path, change: Callable[[str], str], message: str
+):
+    path = tmp_path / "mine.toml"
+    path.write_text(change(FILE.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        read_hyperparameters(path)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
+    with pytest.raises(ValueError, match="cannot read the hyperparameters"):
+        read_hyperparameters(tmp_path / "none.toml")

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, train_many
 from agents.policy import PolicyBatch
-from agents.rl import RAW, TRACES, ObservationConfig, SB3Agent, make_rl_agent
+from agents.rl import HYPERPARAMETERS, RAW, TRACES, ObservationConfig, SB3Agent, make_rl_agent
 from agents.training.source import TaskSource
 from gnm_env import Patterns, Task
 from gnm_env.wrappers import SeededEpisodes
@@ -58,7 +58,7 @@ class Recorder:
 
 @pytest.mark.parametrize("kind", ["ppo", "recurrent-ppo"])
 def test_evaluate_policy_and_noisy_performance_agree_exactly(kind):
-    agent = SB3Agent(lively_model(kind), TASK, TRACES if kind == "ppo" else RAW)
+    agent = SB3Agent(lively_model(kind), TASK, HYPERPARAMETERS[kind].observation)
     returns, _ = evaluate_policy(
         agent, DummyVecEnv([lambda: stream(40)]), 12, return_episode_rewards=True, warn=False
     )
@@ -102,7 +102,7 @@ def test_a_model_trained_on_wrapped_environments_is_shown_the_same_by_the_agent(
 
 @pytest.mark.parametrize("kind", ["ppo", "recurrent-ppo"])
 def test_streams_side_by_side_are_answered_as_each_alone(kind):
-    agent = SB3Agent(lively_model(kind), TASK, TRACES if kind == "ppo" else RAW)
+    agent = SB3Agent(lively_model(kind), TASK, HYPERPARAMETERS[kind].observation)
     bits = (np.random.default_rng(0).random((60, 3, 100)) < 0.05).astype(np.int8)
     begins = np.random.default_rng(1).random((60, 3)) < 0.05
     together, state = [], None
@@ -156,7 +156,9 @@ def test_a_policy_trained_at_another_scale_or_decay_is_refused(
 
 def test_a_policy_that_says_what_it_was_trained_on_need_not_be_told() -> None:
     assert SB3Agent(make_rl_agent("ppo", trial_env()), TASK).observation == TRACES
-    assert SB3Agent(make_rl_agent("recurrent-ppo", trial_env()), TASK).observation == RAW
+    assert SB3Agent(make_rl_agent("recurrent-ppo", trial_env()), TASK).observation == (
+        HYPERPARAMETERS["recurrent-ppo"].observation
+    )
     assert SB3Agent(Recorder(), TASK).observation == RAW
 
 
