@@ -106,6 +106,66 @@ def median(sample: ArrayLike) -> Interval:
     return bootstrap(np.median, sample)
 
 
+def interquartile_mean(values: ArrayLike) -> float:
+    """Mean of the middle half: robust to the few pattern seeds on which everything fails."""
+    return float(stats.trim_mean(np.ravel(values), 0.25))
+
+
+def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
+    """How often a score of `first` is above one of `second`, ties counting half.
+
+    Both are (seeds, tasks); every score is compared with every other one of the same task, and the
+    share averaged over the tasks, as Agarwal et al. (NeurIPS 2021) propose.
+    """
+    x, y = (_by_task(sample) for sample in (first, second))
+    above = x[:, None, :] > y[None, :, :]
+    ties = x[:, None, :] == y[None, :, :]
+    return float((above + 0.5 * ties).mean())
+
+
+def stratified_bootstrap(
+    statistic: Callable[..., float], *samples: ArrayLike, resamples: int = RESAMPLES
+) -> Interval:
+    """`statistic` of samples (seeds, tasks) with its interval: seeds are drawn again task by task.
+
+    Samples that share their seeds stay pairs. Raises ValueError if they differ in shape.
+    """
+    arrays = [_by_task(sample) for sample in samples]
+    shapes = {array.shape for array in arrays}
+    if len(shapes) > 1:
+        raise ValueError(
+            f"samples must have one shape (seeds, tasks), got {sorted(shapes)}: take the "
+            "seeds that all have"
+        )
+    value = float(statistic(*arrays))
+    n, tasks = arrays[0].shape
+    if n < 2:
+        return Interval(value, math.nan, math.nan)
+    rng, columns = np.random.default_rng(0), np.arange(tasks)
+    draws = rng.integers(0, n, (resamples, n, tasks))
+    again = [statistic(*(array[draw, columns] for array in arrays)) for draw in draws]
+    low, high = np.percentile(again, (2.5, 97.5))
+    return Interval(value, float(low), float(high))
+
+
+def _by_task(sample: ArrayLike) -> NDArray[np.float64]:
+    """(seeds,) or (seeds, tasks) as (seeds, tasks)."""
+    array = np.asarray(sample, float)
+    return array[:, None] if array.ndim == 1 else array
+
+
+def mistakes_per_thousand(survived: ArrayLike, cap: int) -> float:
+    """Mistakes in 1,000 bins of the stream, from the bins that runs survived.
+
+    Runs that reached the cap made none, and their bins count all the same: for mistakes at a
+    constant rate this is the maximum-likelihood estimate. Unlike the mean of the capped runs it
+    goes on telling good from better.
+    """
+    bins = np.asarray(survived)
+    heard = bins.sum() + np.sum(bins < cap)  # the bin of a mistake is heard as well
+    return float(1_000.0 * np.sum(bins < cap) / heard)
+
+
 def wins(first: ArrayLike, second: ArrayLike) -> Wins:
     """How often `first` was ahead of `second`, seed by seed."""
     difference = np.asarray(first) - np.asarray(second)

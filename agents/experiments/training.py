@@ -96,7 +96,7 @@ def make_agent(setting: Setting, task: Task) -> Any:
     if setting.get("start") == "published":
         initial_weight = PUBLISHED_START[setting["neuron"]]
     bounds = {k: setting[k] for k in ("weight_bounds",) if k in setting}
-    # Copy 0 has the weights that the pattern seed alone gives; the others' seeds are out of its way.
+    # Copy 0 has the weights that the pattern seed alone gives; other copies have others.
     seed = setting["pattern_seed"] + (LARGEST_SEED + 1) * setting.get("copy", 0)
     return new_agent(neuron, rule, task.n_inputs, seed, initial_weight, **bounds)
 

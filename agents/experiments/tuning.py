@@ -1,10 +1,11 @@
 """TUNING: one search, with the same number of tries, for every neuron and every rule.
 
-An entry is a neuron with a rule. Each is tried with `TRIES` settings: the usual ones, and the points
-of one Sobol sequence, the same for all, stretched over the ranges that `_try` names. The tries are
-scored on pattern seeds 0 to 7, at two and three classes, after a third of the league's trials; the
-best mean of the two keeps its settings. `chosen_settings` reads what the search has found from
-`league_settings.json` beside this file; `choose` makes that file from a finished store.
+An entry is a neuron with a rule. Each is tried with `TRIES` settings: the usual ones, and the
+points of one Sobol sequence, the same for all, stretched over the ranges that `_try` names. The
+tries are scored on pattern seeds 0 to 3, at two and three classes, after a third of the league's
+trials; the best mean of the two keeps its settings. `chosen_settings` reads what the search has
+found from `league_settings.json` beside this file; `choose` makes that file's content from a
+store.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from agents.experiments.design import Axis, Experiment, Setting
 from agents.experiments.statistics import score
 from agents.experiments.training import class_counts, pattern_seeds, training
-from agents.registry import find_model, find_rule
+from agents.registry import find_rule
 from gnm_env.files import atomic_write
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ TRIES = 16
 TRIALS = 20_000
 CHOSEN = Path(__file__).with_name("league_settings.json")
 
-SIZES = {"quick": (range(2), (2,)), "paper": (range(8), (2, 3)), "full": (range(8), (2, 3))}
+SIZES = {"quick": (range(1), (2,)), "full": (range(4), (2, 3))}
 """Pattern seeds and numbers of classes of the search; the league reports on other seeds."""
 
 
@@ -128,6 +129,12 @@ def rule_of(entry: str) -> str:
     return entry.partition(", ")[2]
 
 
+def folder_name(entry: str) -> str:
+    """The name of an entry as that of a folder."""
+    words = entry.lower().replace("′", "").replace(",", " ").split()
+    return "-".join(words)
+
+
 def feedback_of(entry: str) -> str:
     """The class of feedback of an entry."""
     return "B" if entry == NETWORK else RULES[rule_of(entry)].feedback
@@ -170,8 +177,7 @@ def _try(entry: Setting, point: NDArray[np.float64]) -> Setting:
         found["alpha"] = _between(point[0], 0.06, 0.4)
     larger = bool(point[3] >= 0.5)
     if entry["neuron"] == "network":  # has no bounds, and one published start
-        usual = find_model("network").default_initial_weight
-        return {**found, "initial_weight": usual * (2.0 if larger else 1.0)}
+        return {**found, "initial_weight": 0.6 if larger else 0.3}
     bounds = ((0.0, 1.0), (-0.4, 0.4), None)[int(3 * point[2])]
     return {**found, "weight_bounds": bounds, "start": "published" if larger else "matched"}
 
@@ -198,62 +204,65 @@ def for_trials(setting: Mapping[str, Any], trials: int) -> Setting:
     return {**found, "decay_trials": trials} if setting[FALLING] else found
 
 
-def tuning(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
-    """The search: every try of every entry, seed by seed."""
+def search(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
+    """The search for the settings of one entry: all its tries, pattern seed by pattern seed."""
     usual, classes = SIZES[size]
-    tried = {
-        f"{name} #{k}": for_trials(setting, TRIALS)
-        for name, entry in entries().items()
-        for k, setting in enumerate(tries(entry))
-    }
-    # Half of an entry's tries side by side: as many lanes as the league needs, so that one set of
+    tried = tries(entries()[name])
+    settings = tuple(for_trials(setting, TRIALS) for setting in tried)
+    # Half of the tries side by side: as many lanes as the league needs, so that one set of
     # compiled loops serves both.
     axis = Axis(
-        "candidate", tuple(tried), chunk=TRIES // 2, settings=tuple(tried.values()),
-        long_name="neuron, rule and number of the try",
+        "try", tuple(range(len(tried))), chunk=TRIES // 2, settings=settings,
+        long_name="number of the try; 0, the usual settings",
     )  # fmt: skip
     axes = (pattern_seeds(seeds or usual), class_counts(*classes), axis)
-    return training("TUNING", "One search for every entry", axes, trials=TRIALS)
+    common = {key: settings[0][key] for key in ("neuron", "rule")}
+    return training(f"TUNING {name}", "Tries of one entry", axes, trials=TRIALS, **common)
 
 
-def choose(results: xr.Dataset) -> dict[str, Any]:
-    """The best settings of each entry by what a store of the search holds, for the file CHOSEN.
+def choose(name: str, results: xr.Dataset) -> dict[str, Any]:
+    """The best settings of an entry by what the store of its search holds.
 
-    Only pattern seeds that are finished for all count. Raises ValueError if there is none.
+    Only pattern seeds that are finished count. Raises ValueError if there is none.
     """
     survived = results["survived"].transpose("pattern_seed", ...)
     done = (survived >= 0).all(survived.dims[1:]).to_numpy()
     if not done.any():
-        raise ValueError("the search has not finished one pattern seed yet: run it again to go on")
+        raise ValueError(f"the search for {name} has not finished one pattern seed: run it again")
     finished = results.isel(pattern_seed=np.flatnonzero(done))
-    means = score(finished).mean(("pattern_seed", "classes"))
-    chosen = {}
-    for name, entry in entries().items():
-        values = [float(means.sel(candidate=f"{name} #{k}")) for k in range(TRIES)]
-        best = int(np.argmax(values))
-        chosen[name] = {
-            "settings": tries(entry)[best],
-            "try": best,
-            "score": round(values[best]),
-            "usual": round(values[0]),
-        }
+    means = score(finished).mean(("pattern_seed", "classes")).to_numpy()
+    best = int(np.argmax(means))
     return {
-        "search": {
-            "tries": TRIES,
-            "trials": TRIALS,
-            "pattern_seeds": finished["pattern_seed"].values.tolist(),
-            "classes": finished["classes"].values.tolist(),
-        },
-        "chosen": chosen,
+        "settings": tries(entries()[name])[best],
+        "try": best,
+        "score": round(float(means[best])),
+        "usual": round(float(means[0])),
+        "pattern_seeds": finished["pattern_seed"].values.tolist(),
+        "classes": finished["classes"].values.tolist(),
     }
 
 
-def save_choice(choice: Mapping[str, Any], path: Path = CHOSEN) -> None:
-    """Write what `choose` found; one line per entry, so that changes can be read."""
-    lines = [f"  {_json(name)}: {_json(found)}" for name, found in choice["chosen"].items()]
-    text = f'{{\n "search": {_json(choice["search"])},\n "chosen": {{\n' + ",\n".join(lines)
+def save_choices(found: Mapping[str, Mapping[str, Any]], path: Path) -> None:
+    """Write what `choose` found for each entry; entries that it says nothing of stay as they are.
+
+    One line an entry, so that changes can be read.
+    """
+    known = json.loads(path.read_text("utf-8"))["chosen"] if path.exists() else {}
+    known |= found
+    chosen = {name: known[name] for name in entries() if name in known}
     with atomic_write(path) as file:
-        file.write((text + "\n }\n}\n").encode())
+        file.write(
+            as_json({"search": {"tries": TRIES, "trials": TRIALS}, "chosen": chosen}).encode()
+        )
+
+
+def as_json(value: Mapping[str, Any]) -> str:
+    """JSON with one line for each entry of the second level, so that changes can be read."""
+    parts = []
+    for name, inner in value.items():
+        lines = [f"  {_json(key)}: {_json(one)}" for key, one in inner.items()]
+        parts.append(f" {_json(name)}: {{\n" + ",\n".join(lines) + "\n }")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def _json(value: Any) -> str:
@@ -266,6 +275,3 @@ def chosen_settings(path: Path = CHOSEN) -> dict[str, Setting]:
         raise ValueError(f"{path} is not there: run `gnm league --part rules --tune` to make it")
     found = json.loads(path.read_text("utf-8"))["chosen"]
     return {name: entry["settings"] for name, entry in found.items()}
-
-
-EXPERIMENTS = {"TUNING": tuning}
