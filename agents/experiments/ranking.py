@@ -20,10 +20,10 @@ from agents.experiments.design import Axis, Block, Experiment, Setting
 from agents.experiments.statistics import (
     Interval,
     Wins,
-    interquartile_mean,
+    improvements,
     mean,
+    middle_means,
     mistakes_per_thousand,
-    probability_of_improvement,
     stratified_bootstrap,
     wins,
 )
@@ -206,7 +206,7 @@ def contrasts(table: Table) -> Iterator[Contrast]:
                 x, y = one.bins[a], other.bins[b]
                 yield Contrast(
                     first, second, classes, len(shared), mean(x - y),
-                    stratified_bootstrap(probability_of_improvement, x, y), wins(x, y),
+                    stratified_bootstrap(improvements, x, y), wins(x, y),
                 )  # fmt: skip
 
 
@@ -227,7 +227,7 @@ def overall(table: Table, counts: Sequence[int]) -> list[Overall]:
         if all(classes in by_classes for classes in counts):
             columns = _matrix([by_classes[classes] for classes in counts])
             if len(columns):
-                iqm = stratified_bootstrap(interquartile_mean, columns)
+                iqm = stratified_bootstrap(middle_means, columns)
                 found.append(Overall(name, len(columns), iqm))
     return sorted(found, key=lambda row: -row.iqm.value)
 
@@ -267,7 +267,7 @@ def score_table(table: Table) -> str:
 def _cells(scores: Scores | None) -> list[str]:
     if scores is None:
         return ["", ""]
-    iqm = stratified_bootstrap(interquartile_mean, scores.bins)
+    iqm = stratified_bootstrap(middle_means, scores.bins)
     ends = f" ({iqm.low:,.0f} … {iqm.high:,.0f})" if np.isfinite(iqm.low) else ""
     rate = np.median(scores.mistakes)
     return [f"{iqm.value:,.0f}{ends}", f"{rate:.2g}" if np.isfinite(rate) else ""]
@@ -357,7 +357,10 @@ def draw_ranking(table: Table) -> Figure:
         row[0].set_yticklabels(rules)
         row[0].set_title(f"{feedback}: told {FEEDBACK[feedback]}", loc="left", fontsize=8)
     for axis, classes in zip(axes[0], counts, strict=True):
-        axis.set_title(_plural(classes), loc="right", fontweight="bold")
+        axis.annotate(
+            _plural(classes), (0.5, 1.0), (0, 20), xycoords="axes fraction",
+            textcoords="offset points", ha="center", fontweight="bold",
+        )  # fmt: skip
     figure.supxlabel("bins survived, interquartile mean", fontsize=8)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=3)
@@ -380,7 +383,7 @@ def _panel(axis: Any, table: Table, rules: list[str], classes: int) -> None:
         for place, rule in enumerate(rules):
             scores = table.get(f"{neuron}, {rule}", {}).get(classes)
             if scores is not None:
-                iqm = stratified_bootstrap(interquartile_mean, scores.bins)
+                iqm = stratified_bootstrap(middle_means, scores.bins)
                 axis.plot([iqm.low, iqm.high], [place + shift] * 2, color=colour, lw=1.1)
                 places.append(place + shift)
                 values.append(iqm.value)
@@ -389,6 +392,7 @@ def _panel(axis: Any, table: Table, rules: list[str], classes: int) -> None:
     axis.set(xlim=(0, 10_200), ylim=(len(rules) - 0.5, -0.5), xticks=(0, 5_000, 10_000))
     axis.set_yticks(range(len(rules)), [""] * len(rules))
     axis.set_xticks((2_500, 7_500), minor=True)
+    axis.xaxis.set_major_formatter("{x:,.0f}")
     axis.grid(axis="x", which="both", color="0.92", lw=0.6)
 
 
@@ -420,17 +424,17 @@ FRONT = {
 
 def draw_front(table: Table) -> Figure:
     """How long learners survive by number of classes: one neuron, the network, PPO."""
-    figure, ((axis,),) = panels(1, 1, width=WIDE, height=3.3)
+    figure, ((axis,),) = panels(1, 1, width=WIDE, height=4.0)
     counts = sorted({classes for name in FRONT for classes in table.get(name, {})})
     places = np.linspace(-0.14, 0.14, len(FRONT))
     for shift, (name, row) in zip(places, FRONT.items(), strict=True):
         known = sorted(table.get(name, {}))
-        found = [stratified_bootstrap(interquartile_mean, table[name][c].bins) for c in known]
+        found = [stratified_bootstrap(middle_means, table[name][c].bins) for c in known]
         x = [counts.index(c) + shift for c in known]
         seeds = max((len(table[name][c].seeds) for c in known), default=0)
         axis.plot(
             x, [iqm.value for iqm in found], row.mark, ls=row.dashes, color=row.colour, ms=5,
-            lw=1.4, label=f"{row.label} ({seeds})",
+            lw=1.4, label=f"{row.label} ({seeds} pattern seeds)",
         )  # fmt: skip
         for place, iqm in zip(x, found, strict=True):
             axis.plot([place, place], [iqm.low, iqm.high], color=row.colour, lw=1.4)
@@ -440,5 +444,6 @@ def draw_front(table: Table) -> Figure:
     axis.set_xticks(range(len(counts)), [_plural(classes) for classes in counts])
     axis.set(ylim=(0, 10_200), ylabel="bins without a mistake, of 10,000")
     axis.grid(axis="y", color="0.92", lw=0.6)
-    figure.legend(loc="outside right upper", title="(number of pattern seeds)")
+    axis.yaxis.set_major_formatter("{x:,.0f}")
+    figure.legend(loc="outside lower center", fontsize=8)
     return figure

@@ -108,29 +108,40 @@ def median(sample: ArrayLike) -> Interval:
 
 def interquartile_mean(values: ArrayLike) -> float:
     """Mean of the middle half: robust to the few pattern seeds on which everything fails."""
-    return float(stats.trim_mean(np.ravel(values), 0.25))
+    return float(middle_means(np.ravel(values)[:, None]))
 
 
-def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
+def middle_means(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Interquartile mean of each sample (…, seeds, tasks), seeds and tasks taken together."""
+    values = np.sort(samples.reshape(*samples.shape[:-2], -1), axis=-1)
+    cut = values.shape[-1] // 4
+    middle: NDArray[np.float64] = values[..., cut : values.shape[-1] - cut].mean(-1)
+    return middle
+
+
+def improvements(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """How often a score of `first` is above one of `second`, ties counting half.
 
-    Both are (seeds, tasks); every score is compared with every other one of the same task, and the
-    share averaged over the tasks, as Agarwal et al. (NeurIPS 2021) propose.
+    Both are (…, seeds, tasks); every score is compared with every other one of the same task, and
+    the share averaged over the tasks: the probability of improvement of Agarwal et al. (NeurIPS
+    2021).
     """
-    x, y = (_by_task(sample) for sample in (first, second))
-    above = x[:, None, :] > y[None, :, :]
-    ties = x[:, None, :] == y[None, :, :]
-    return float((above + 0.5 * ties).mean())
+    x, y = first[..., :, None, :], second[..., None, :, :]
+    share: NDArray[np.float64] = ((x > y) + 0.5 * (x == y)).mean((-3, -2, -1))
+    return share
 
 
 def stratified_bootstrap(
-    statistic: Callable[..., float], *samples: ArrayLike, resamples: int = RESAMPLES
+    statistic: Callable[..., NDArray[np.float64]], *samples: ArrayLike, resamples: int = RESAMPLES
 ) -> Interval:
     """`statistic` of samples (seeds, tasks) with its interval: seeds are drawn again task by task.
 
-    Samples that share their seeds stay pairs. Raises ValueError if they differ in shape.
+    The statistic works along the last two axes, as `middle_means` and `improvements` do. A sample
+    (seeds,) is of one task. Samples that share their seeds stay pairs. Raises ValueError if they
+    differ in shape.
     """
-    arrays = [_by_task(sample) for sample in samples]
+    arrays = [np.asarray(sample, float) for sample in samples]
+    arrays = [array[:, None] if array.ndim == 1 else array for array in arrays]
     shapes = {array.shape for array in arrays}
     if len(shapes) > 1:
         raise ValueError(
@@ -141,17 +152,10 @@ def stratified_bootstrap(
     n, tasks = arrays[0].shape
     if n < 2:
         return Interval(value, math.nan, math.nan)
-    rng, columns = np.random.default_rng(0), np.arange(tasks)
-    draws = rng.integers(0, n, (resamples, n, tasks))
-    again = [statistic(*(array[draw, columns] for array in arrays)) for draw in draws]
+    draws = np.random.default_rng(0).integers(0, n, (resamples, n, tasks))
+    again = statistic(*(array[draws, np.arange(tasks)] for array in arrays))
     low, high = np.percentile(again, (2.5, 97.5))
     return Interval(value, float(low), float(high))
-
-
-def _by_task(sample: ArrayLike) -> NDArray[np.float64]:
-    """(seeds,) or (seeds, tasks) as (seeds, tasks)."""
-    array = np.asarray(sample, float)
-    return array[:, None] if array.ndim == 1 else array
 
 
 def mistakes_per_thousand(survived: ArrayLike, cap: int) -> float:
