@@ -39,7 +39,12 @@ SETTINGS, SCORES = "settings.json", "scores.json"
 def options(parser: Parser) -> None:
     add = parser.add_argument
     share(parser, "--size", choices=("quick", "full"))
-    add("--part", choices=(*PARTS, RULES), action="append", help="only this part (default all)")
+    add(
+        "--part",
+        choices=(*PARTS, RULES),
+        action="append",
+        help="this part: neurons and rl are the default, rules every rule on every neuron",
+    )
     share(parser, "--seeds")
     add("--rules", nargs="+", metavar="RULE", help="of the part rules: only these, such as "
         f"{'; '.join(tuning.RULES)}; or by their registered names")  # fmt: skip
@@ -58,9 +63,11 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     """Compute what is missing, then print and draw what is there."""
     folder = options.out or RESULTS / "league" / options.size
     chosen_rows = options.rules is not None or options.neurons is not None
-    parts = options.part or ([RULES] if chosen_rows or options.tune else [*PARTS, RULES])
+    parts = options.part or ([RULES] if chosen_rows or options.tune else PARTS)
     if (chosen_rows or options.tune) and RULES not in parts:
-        raise ValueError("--rules, --neurons and --tune belong to --part rules: leave them out")
+        raise ValueError(
+            "--rules, --neurons and --tune belong to --part rules: add it, or leave them out"
+        )
     # Wrong names are told before anything is trained.
     names = ranking.rows_of(options.neurons, options.rules) if RULES in parts else []
     if not options.so_far:

@@ -331,10 +331,11 @@ NEURON_STYLES = {
 
 
 def draw(table: Table, folder: Path) -> list[Path]:
-    """ranking.png and front.png, with their PDFs, in `folder`."""
+    """front.png and, once an entry was scored, ranking.png, with their PDFs, in `folder`."""
     paths = []
+    pictures = {"front": draw_front, **({"ranking": draw_ranking} if _groups(table) else {})}
     with styled():
-        for name, picture in (("ranking", draw_ranking), ("front", draw_front)):
+        for name, picture in pictures.items():
             figure = picture(table)
             for ending in ("png", "pdf"):
                 paths.append(folder / f"{name}.{ending}")
