@@ -124,10 +124,8 @@ def _seed_by_seed(
     """
     for seed in next(iter(experiments.values())).axes[0].values:
         for name, wanted in experiments.items():
-            sweep(
-                wanted, folder / tuning.folder_name(name), executor, repair=repair,
-                only=lambda block, of=wanted, at=seed: ranking.seed_of(of, block) == at,
-            )  # fmt: skip
+            store, only = folder / tuning.folder_name(name), ranking.on_seed(wanted, seed)
+            sweep(wanted, store, executor, repair=repair, only=only)
 
 
 def _ranked(folder: Path, names: list[str], pictures: list[str]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ seed is the mean of the three. Intervals are stratified bootstraps over pattern 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -86,9 +86,10 @@ def rows_of(neurons: Sequence[str] | None, rules: Sequence[str] | None) -> list[
     return [*entries(neurons, rules), *([PAPER] if everything else [])]
 
 
-def seed_of(experiment: Experiment, block: Block) -> int:
-    """The pattern seed of a block."""
-    return int(experiment.axes[0].values[block.ranges[0][0]])
+def on_seed(experiment: Experiment, seed: int) -> Callable[[Block], bool]:
+    """Whether a block of `experiment` is of this pattern seed."""
+    seeds = experiment.axes[0].values
+    return lambda block: bool(seeds[block.ranges[0][0]] == seed)
 
 
 # --- what a store says ---------------------------------------------------------------------------
@@ -257,7 +258,9 @@ def score_table(table: Table) -> str:
     lines = [_row(head), _row(["---"] * 3 + ["---:"] * (len(head) - 3))]
     for name in _by_feedback(table):
         by_classes = table[name]
-        cells = [_told(name), name, str(max(len(s.seeds) for s in by_classes.values()))]
+        numbers = [len(by_classes[c].seeds) for c in counts if c in by_classes]
+        same = len(set(numbers)) == 1
+        cells = [_told(name), name, str(numbers[0]) if same else ", ".join(map(str, numbers))]
         for classes in counts:
             cells += _cells(by_classes.get(classes))
         lines.append(_row(cells))

@@ -247,8 +247,9 @@ def save_choices(found: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
     One line an entry, so that changes can be read.
     """
-    known = json.loads(path.read_text("utf-8"))["chosen"] if path.exists() else {}
-    known |= found
+    known = dict(found)
+    if path.exists():
+        known = json.loads(path.read_text("utf-8"))["chosen"] | known
     chosen = {name: known[name] for name in entries() if name in known}
     with atomic_write(path) as file:
         file.write(

@@ -97,7 +97,8 @@ def test_a_learner_is_an_experiment_of_its_own(tmp_path) -> None:
     first = experiment.blocks()[0]
     assert first.settings[2]["alpha"] == setting["alpha"]
     assert first.settings[2]["trials"] == ranking.TRIALS
-    assert ranking.seed_of(experiment, experiment.blocks()[-1]) == 101
+    wanted = [*map(ranking.on_seed(experiment, 101), experiment.blocks())]
+    assert wanted == [False] * 4 + [True] * 4
     assert "decay_trials" not in ranking.ranking(PAPER, "quick", None, path).common
     with pytest.raises(ValueError, match="has no settings for GNM, ALL: run `gnm league --tune`"):
         ranking.ranking("GNM, ALL", "full", None, path)
