@@ -104,7 +104,7 @@ def _rank(options: argparse.Namespace, folder: Path, names: list[str], executor:
     """Compute what is missing of the part "rules": of the search too, where it is asked for."""
     settings = folder / SETTINGS
     if options.tune:
-        tuned = [name for name in names if name != ranking.PAPER]
+        tuned = [name for name in names if name not in ranking.FIXED]
         searches = {name: tuning.search(name, options.size) for name in tuned}
         _seed_by_seed(searches, folder / "tuning", executor, options.repair)
         stores = {name: folder / "tuning" / tuning.folder_name(name) for name in tuned}

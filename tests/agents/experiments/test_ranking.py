@@ -113,7 +113,7 @@ def test_the_pictures_are_drawn_from_the_scores_alone(tmp_path) -> None:
 
 
 def test_folders_of_entries_are_plain_words_and_differ() -> None:
-    names = [*tuning.entries(), PAPER]
+    names = [*tuning.entries(), *ranking.FIXED]
     folders = [tuning.folder_name(name) for name in names]
     assert len(set(folders)) == len(names)
     assert all(folder.replace("-", "").isascii() and " " not in folder for folder in folders)

@@ -111,3 +111,13 @@ def test_the_search_hears_other_pattern_seeds_than_the_league() -> None:
 def test_without_settings_it_says_how_to_make_them(tmp_path) -> None:
     with pytest.raises(ValueError, match="is not there: run `gnm league"):
         tuning.chosen_settings(tmp_path / "settings.json")
+
+
+def test_the_settings_that_come_with_the_package_are_tries_of_the_search() -> None:
+    known = json.loads(tuning.CHOSEN.read_text("utf-8"))
+    assert known["search"] == {"tries": tuning.TRIES, "trials": tuning.TRIALS}
+    for name, found in known["chosen"].items():
+        tried = tuning.tries(tuning.entries()[name])[found["try"]]
+        assert tuning.for_trials(found["settings"], 7) == tuning.for_trials(tried, 7), name
+        assert found["pattern_seeds"] == [*tuning.SIZES["full"][0]]
+        assert found["score"] >= found["usual"]
