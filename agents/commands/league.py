@@ -3,10 +3,13 @@
     gnm league                       the quick size, one class: minutes
     gnm league --size full --jobs 16
     gnm league --part rl --seeds 100-104 --jobs 4
+    gnm league --part rules --size full      every rule on every neuron, tuned alike
+    gnm league --rules critical all --neurons GNM MST
 
 All hear the same patterns and are scored on the same streams; they are compared at the same number
 of bins heard, and with each one's whole budget. Each training is one process, and one block of the
-store: a run that is stopped goes on from what is there.
+store: a run that is stopped goes on from what is there. The part "rules" has a table and pictures
+of its own; `--tune` searches its settings anew.
 """
 
 from __future__ import annotations
@@ -14,21 +17,41 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from agents.commands.terminal import RESULTS, Parser, at_least, share
+from agents.experiments import ranking, tuning
+from agents.experiments.design import Experiment
 from agents.experiments.league import PARTS, draw, league, read_league, rows, text_table
+from agents.experiments.store import read
 from agents.experiments.sweep import sweep
+from gnm_env.files import atomic_write
 
 RESUMES = True
+RULES = "rules"
+SETTINGS, SCORES = "settings.json", "scores.json"
 
 
 def options(parser: Parser) -> None:
     add = parser.add_argument
     share(parser, "--size", choices=("quick", "full"))
-    add("--part", choices=PARTS, action="append", help="only this half (default both)")
+    add(
+        "--part",
+        choices=(*PARTS, RULES),
+        action="append",
+        help="this part: neurons and rl are the default, rules every rule on every neuron",
+    )
     share(parser, "--seeds")
+    add("--rules", nargs="+", metavar="RULE", help="of the part rules: only these, such as "
+        f"{'; '.join(tuning.RULES)}; or by their registered names")  # fmt: skip
+    add("--neurons", nargs="+", metavar="NEURON", help="of the part rules: only on these of "
+        f"{', '.join(tuning.NEURONS)}")  # fmt: skip
+    add("--tune", action="store_true", help="of the part rules: search the settings first; they "
+        "then stand in the folder, in place of those that come with the package")  # fmt: skip
     add("--jobs", type=at_least(1), default=1, metavar="N", help="trainings at a time (default 1)")
     add("--steps", type=at_least(1), metavar="N", help="bins that RL agents hear, to try it out")
     share(parser, "--out", help=f"(default {RESULTS}/league/SIZE)")
@@ -40,21 +63,84 @@ def options(parser: Parser) -> None:
 def main(options: argparse.Namespace) -> dict[str, Any]:
     """Compute what is missing, then print and draw what is there."""
     folder = options.out or RESULTS / "league" / options.size
-    for part in () if options.so_far else options.part or PARTS:
-        wanted = league(part, options.size, options.seeds, options.steps)
-        # Each training keeps to one core, so that times can be compared.
-        for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-            os.environ[name] = "1"
-        with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as executor:
-            sweep(wanted, folder / part, executor, repair=options.repair)
-    results = [read_league(folder / part) for part in PARTS if (folder / part).exists()]
-    if not results:
-        raise ValueError(f"there is no league in {folder}: leave --so-far out to train one")
-    table = rows(results)
-    print(text_table(table))
-    pictures = draw(results, folder)
-    if options.keep:
-        from agents.suite.league import keep
+    chosen_rows = options.rules is not None or options.neurons is not None
+    parts = options.part or ([RULES] if chosen_rows or options.tune else PARTS)
+    if (chosen_rows or options.tune) and RULES not in parts:
+        raise ValueError(
+            "--rules, --neurons and --tune belong to --part rules: add it, or leave them out"
+        )
+    # Wrong names are told before anything is trained.
+    names = ranking.rows_of(options.neurons, options.rules) if RULES in parts else []
+    if not options.so_far:
+        with _processes(options.jobs) as executor:
+            for part in parts:
+                if part == RULES:
+                    _rank(options, folder, names, executor)
+                    continue
+                wanted = league(part, options.size, options.seeds, options.steps)
+                sweep(wanted, folder / part, executor, repair=options.repair)
+    told: dict[str, Any] = {"store": str(folder), "table": [], "pictures": []}
+    results = [read_league(folder / p) for p in PARTS if p in parts and (folder / p).exists()]
+    if results:
+        told["table"] = rows(results)
+        print(text_table(told["table"]))
+        told["pictures"] += map(str, draw(results, folder))
+        if options.keep:
+            from agents.suite.league import keep
 
-        print(f"kept in {keep(table)}")
-    return {"table": table, "pictures": [str(path) for path in pictures], "store": str(folder)}
+            print(f"kept in {keep(told['table'])}")
+    if RULES in parts and (folder / RULES).exists():
+        told |= _ranked(folder, names, told["pictures"])
+    elif not results:
+        raise ValueError(f"there is no league in {folder}: leave --so-far out to train one")
+    return told
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[Executor]:
+    """Processes that keep to one core each, so that times can be compared."""
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[name] = "1"
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as executor:
+        yield executor
+
+
+def _rank(options: argparse.Namespace, folder: Path, names: list[str], executor: Executor) -> None:
+    """Compute what is missing of the part "rules": of the search too, where it is asked for."""
+    settings = folder / SETTINGS
+    if options.tune:
+        tuned = [name for name in names if name not in ranking.FIXED]
+        searches = {name: tuning.search(name, options.size) for name in tuned}
+        _seed_by_seed(searches, folder / "tuning", executor, options.repair)
+        stores = {name: folder / "tuning" / tuning.folder_name(name) for name in tuned}
+        found = {name: tuning.choose(name, read(store)) for name, store in stores.items()}
+        tuning.save_choices(found, settings)
+    chosen = settings if settings.exists() else tuning.CHOSEN
+    wanted = {n: ranking.ranking(n, options.size, options.seeds, chosen) for n in names}
+    _seed_by_seed(wanted, folder / RULES, executor, options.repair)
+
+
+def _seed_by_seed(
+    experiments: Mapping[str, Experiment], folder: Path, executor: Executor, repair: bool
+) -> None:
+    """All experiments on the first pattern seed, then on the next: each has a store in `folder`.
+
+    A run that is stopped has all of them on the seeds that it came to.
+    """
+    for seed in next(iter(experiments.values())).axes[0].values:
+        for name, wanted in experiments.items():
+            store, only = folder / tuning.folder_name(name), ranking.on_seed(wanted, seed)
+            sweep(wanted, store, executor, repair=repair, only=only)
+
+
+def _ranked(folder: Path, names: list[str], pictures: list[str]) -> dict[str, Any]:
+    """Print, draw and keep what is finished of the part "rules"."""
+    table = ranking.with_others(ranking.read_ranking(folder / RULES, names))
+    text = ranking.markdown(table)
+    print(text)
+    scores = ranking.saved(table)
+    for name, content in (("rules.md", text), (SCORES, tuning.as_json(scores))):
+        with atomic_write(folder / name) as file:
+            file.write(content.encode())
+    drawn = [*pictures, *map(str, ranking.draw(table, folder))]
+    return {"rules": scores, "pictures": drawn}

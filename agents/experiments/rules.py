@@ -13,7 +13,7 @@ import numpy as np
 
 from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import by_seed, score
+from agents.experiments.statistics import by_seed, interquartile_mean, score
 from agents.experiments.training import class_counts, learners, pattern_seeds, training
 from agents.experiments.verdict import Results
 from agents.plotting import WIDE, panels
@@ -63,13 +63,6 @@ def rules(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     usual, classes = SIZES[size]
     axes = (class_counts(*classes), pattern_seeds(seeds or usual), learners(LEARNERS))
     return training("RULES", "Learning rules, one neuron of 100 weights", axes)
-
-
-def interquartile_mean(values: np.ndarray[Any, Any]) -> float:
-    """Mean of the middle half: robust to the few pattern seeds on which everything fails."""
-    from scipy.stats import trim_mean
-
-    return float(trim_mean(values, 0.25))
 
 
 def table(results: xr.Dataset) -> str:

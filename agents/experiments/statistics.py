@@ -106,6 +106,70 @@ def median(sample: ArrayLike) -> Interval:
     return bootstrap(np.median, sample)
 
 
+def interquartile_mean(values: ArrayLike) -> float:
+    """Mean of the middle half: robust to the few pattern seeds on which everything fails."""
+    return float(middle_means(np.ravel(values)[:, None]))
+
+
+def middle_means(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Interquartile mean of each sample (…, seeds, tasks), seeds and tasks taken together."""
+    values = np.sort(samples.reshape(*samples.shape[:-2], -1), axis=-1)
+    cut = values.shape[-1] // 4
+    middle: NDArray[np.float64] = values[..., cut : values.shape[-1] - cut].mean(-1)
+    return middle
+
+
+def improvements(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How often a score of `first` is above one of `second`, ties counting half.
+
+    Both are (…, seeds, tasks); every score is compared with every other one of the same task, and
+    the share averaged over the tasks: the probability of improvement of Agarwal et al. (NeurIPS
+    2021).
+    """
+    x, y = first[..., :, None, :], second[..., None, :, :]
+    share: NDArray[np.float64] = ((x > y) + 0.5 * (x == y)).mean((-3, -2, -1))
+    return share
+
+
+def stratified_bootstrap(
+    statistic: Callable[..., NDArray[np.float64]], *samples: ArrayLike, resamples: int = RESAMPLES
+) -> Interval:
+    """`statistic` of samples (seeds, tasks) with its interval: seeds are drawn again task by task.
+
+    The statistic works along the last two axes, as `middle_means` and `improvements` do. A sample
+    (seeds,) is of one task. Samples that share their seeds stay pairs. Raises ValueError if they
+    differ in shape.
+    """
+    arrays = [np.asarray(sample, float) for sample in samples]
+    arrays = [array[:, None] if array.ndim == 1 else array for array in arrays]
+    shapes = {array.shape for array in arrays}
+    if len(shapes) > 1:
+        raise ValueError(
+            f"samples must have one shape (seeds, tasks), got {sorted(shapes)}: take the "
+            "seeds that all have"
+        )
+    value = float(statistic(*arrays))
+    n, tasks = arrays[0].shape
+    if n < 2:
+        return Interval(value, math.nan, math.nan)
+    draws = np.random.default_rng(0).integers(0, n, (resamples, n, tasks))
+    again = statistic(*(array[draws, np.arange(tasks)] for array in arrays))
+    low, high = np.percentile(again, (2.5, 97.5))
+    return Interval(value, float(low), float(high))
+
+
+def mistakes_per_thousand(survived: ArrayLike, cap: int) -> float:
+    """Mistakes in 1,000 bins of the stream, from the bins that runs survived.
+
+    Runs that reached the cap made none, and their bins count all the same: for mistakes at a
+    constant rate this is the maximum-likelihood estimate. Unlike the mean of the capped runs it
+    goes on telling good from better.
+    """
+    bins = np.asarray(survived)
+    heard = bins.sum() + np.sum(bins < cap)  # the bin of a mistake is heard as well
+    return float(1_000.0 * np.sum(bins < cap) / heard)
+
+
 def wins(first: ArrayLike, second: ArrayLike) -> Wins:
     """How often `first` was ahead of `second`, seed by seed."""
     difference = np.asarray(first) - np.asarray(second)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +21,7 @@ def sweep(
     *,
     repair: bool = False,
     interval: float = 60.0,
+    only: Callable[[Block], bool] | None = None,
 ) -> Summary:
     """Compute what is missing in the store at `folder`; returns its summary.
 
@@ -30,12 +31,15 @@ def sweep(
         executor: where blocks are computed.
         repair: compute damaged blocks again, instead of refusing the store.
         interval: seconds between lines of progress where there is no terminal.
+        only: whether a block is wanted this time; None: all are.
 
     Raises StoreError, OSError (with the number of blocks that are kept; ConnectionError if workers
     are gone), or what a block raises.
     """
     with open_store(folder, experiment, repair=repair) as store:
-        pending, total = store.pending(), len(experiment.blocks())
+        wanted = [block.number for block in experiment.blocks() if only is None or only(block)]
+        chosen, total = set(wanted), len(wanted)
+        pending = [block for block in store.pending() if block.number in chosen]
         if pending:
             with Progress(
                 experiment.name, total, total - len(pending), interval=interval

@@ -42,7 +42,8 @@ WEIGHTS = Variable("weights", "float64", "1", "weights at the end of training", 
 _TASK = {field.name for field in fields(Task)} - {"n_classes"}
 _SHARED = {"classes", "pattern_seed", *RUN, *_TASK}
 """What all neurons of a block have in common."""
-_OWN = {"neuron", "rule", "start", "initial_weight", "weight_bounds"}
+_OWN = {"neuron", "rule", "start", "initial_weight", "weight_bounds", "copy"}
+"""`copy` numbers neurons that differ in their initial weights alone."""
 
 
 def training_seed(classes: Any, pattern_seed: Any) -> Any:
@@ -83,15 +84,19 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
 
 def make_agent(setting: Setting, task: Task) -> Any:
     """The untrained agent that a setting describes."""
+    # "neuron" and "rule" name classes, whatever fields of these names a class may have.
+    given = setting.keys() - {"neuron", "rule"}
     neuron, rule = (
-        kind(**{f.name: setting[f.name] for f in fields(kind) if f.name in setting})
+        kind(**{f.name: setting[f.name] for f in fields(kind) if f.name in given})
         for kind in (find_model(setting["neuron"]), find_rule(setting["rule"]))
     )
     initial_weight = setting.get("initial_weight")
     if setting.get("start") == "published":
         initial_weight = PUBLISHED_START[setting["neuron"]]
     bounds = {k: setting[k] for k in ("weight_bounds",) if k in setting}
-    return new_agent(neuron, rule, task.n_inputs, setting["pattern_seed"], initial_weight, **bounds)
+    # Copy 0 has the weights that the pattern seed alone gives; other copies have others.
+    seed = setting["pattern_seed"] + (LARGEST_SEED + 1) * setting.get("copy", 0)
+    return new_agent(neuron, rule, task.n_inputs, seed, initial_weight, **bounds)
 
 
 # --- declaring an experiment ---------------------------------------------------------------------

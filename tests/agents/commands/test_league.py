@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from agents.commands import league as command
 from agents.commands.terminal import parse
-from agents.experiments import league
+from agents.experiments import league, ranking, tuning
 from agents.experiments.design import Block
 from agents.experiments.league import (
     FINAL,
@@ -18,6 +21,9 @@ from agents.experiments.league import (
     RL_LEARNERS,
     learn_and_score,
 )
+from agents.experiments.sweep import sweep
+from agents.experiments.training import class_counts, pattern_seeds, training
+from agents.experiments.workers import threads
 
 
 def cell(setting: dict[str, Any], **changes: Any) -> dict[str, Any]:
@@ -124,8 +130,6 @@ def test_what_is_not_finished_is_left_out_of_table_and_picture(tmp_path):
 
 def test_without_any_league_so_far_it_says_so(tmp_path):
     pytest.importorskip("stable_baselines3")
-    from agents.commands import league as command
-
     with pytest.raises(ValueError, match=r"there is no league in .* leave --so-far out"):
         command.main(parse(command, ["--so-far", "--out", tmp_path]))
 
@@ -142,6 +146,66 @@ def test_every_learner_that_learns_has_a_style_of_its_own():
     learning |= {n for n, s in RL_LEARNERS.items() if s.get("steps") != 0}
     assert learning == set(league.STYLES)
     assert len(set(league.STYLES.values())) == len(league.STYLES)
+
+
+def ranked(folder: Path, name: str, bins: int) -> None:
+    """The store of a learner of the part "rules" that survives so many bins throughout."""
+
+    def survives(block: Block) -> dict[str, Any]:
+        return {
+            "survived": np.full((*block.shape, 100), bins),
+            "error_rate": np.zeros(block.shape),
+        }
+
+    wanted = replace(ranking.ranking(name, "quick", (100, 101, 102)), compute=survives)
+    with threads(1) as executor:
+        sweep(wanted, folder / "rules" / tuning.folder_name(name), executor)
+
+
+def test_the_part_rules_is_told_and_drawn_from_what_is_finished(tmp_path, capsys):
+    ranked(tmp_path, ranking.PAPER, 700)
+    told = command.main(parse(command, ["--part", "rules", "--so-far", "--out", tmp_path]))
+    assert told["rules"][ranking.PAPER]["2"]["101"][0] == 700
+    assert "| A | GNM, ALL as published | 3 | 700 (700 … 700)" in capsys.readouterr().out
+    kept = {path.name for path in tmp_path.iterdir()}
+    assert kept >= {"rules.md", "scores.json", "front.png"}
+
+
+def test_all_learners_hear_one_pattern_seed_before_the_next(tmp_path):
+    heard = []
+
+    def note(block: Block) -> dict[str, Any]:
+        heard.append((block.settings[0]["pattern_seed"], block.settings[0]["rule"]))
+        return {"survived": np.zeros((*block.shape, 100)), "error_rate": np.zeros(block.shape)}
+
+    rows = {
+        rule: training("a toy", "", (pattern_seeds((3, 5)), class_counts(2)), rule=rule)
+        for rule in ("all", "et")
+    }
+    rows = {name: replace(row, compute=note) for name, row in rows.items()}
+    with threads(1) as executor:
+        command._seed_by_seed(rows, tmp_path, executor, repair=False)
+    assert heard == [(3, "all"), (3, "et"), (5, "all"), (5, "et")]
+
+
+@pytest.mark.parametrize("words", [["--rules", "hebb"], ["--neurons", "pyramidal"]])
+def test_a_row_that_there_is_not_is_refused_before_anything_is_trained(words, tmp_path):
+    with pytest.raises(ValueError, match="in the league: choose among"):
+        command.main(parse(command, [*words, "--out", tmp_path]))
+    with pytest.raises(ValueError, match="belong to --part rules: add it, or leave them out"):
+        command.main(parse(command, ["--rules", "all", "--part", "rl"]))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_a_search_and_its_league_run_from_end_to_end(tmp_path, monkeypatch):
+    for module in (tuning, ranking):
+        monkeypatch.setattr(module, "TRIALS", 300)
+        monkeypatch.setitem(module.SIZES, "quick", ((7,), (1,)))
+    words = ["--tune", "--rules", "all", "--neurons", "GNM", "--out", tmp_path]
+    told = command.main(parse(command, words))
+    assert list(told["rules"]["GNM, ALL"]["1"]) == ["7"]
+    assert tuning.chosen_settings(tmp_path / "settings.json")["GNM, ALL"]["rule"] == "all"
 
 
 def test_steps_shorten_the_training_of_rl_agents_alone():

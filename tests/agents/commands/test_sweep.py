@@ -50,6 +50,13 @@ def test_a_finished_sweep_computes_nothing_again(tmp_path: Path) -> None:
     xr.testing.assert_identical(run(tmp_path / "toy", compute=never), first)
 
 
+def test_a_sweep_may_be_told_to_compute_some_blocks_only(tmp_path: Path) -> None:
+    with threads(1) as executor:
+        some = sweep(toy(), tmp_path / "toy", executor, only=lambda block: block.number % 3 == 0)
+        assert (some.done, some.blocks) == (6, 18)
+        assert sweep(toy(), tmp_path / "toy", executor).done == 18
+
+
 def helper(name: str, *arguments: object) -> dict[str, Any]:
     """Run one of the programs beside this file; its last line is what it has to tell."""
     ended = subprocess.run(

@@ -7,7 +7,20 @@ import pytest
 import xarray as xr
 
 from agents.experiments.heat_maps import Line, best, optimal_line, residuals
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, median, score, wins
+from agents.experiments.statistics import (
+    Interval,
+    bootstrap,
+    by_seed,
+    improvements,
+    interquartile_mean,
+    mean,
+    median,
+    middle_means,
+    mistakes_per_thousand,
+    score,
+    stratified_bootstrap,
+    wins,
+)
 
 
 def test_a_bootstrap_interval_covers_the_mean_as_often_as_it_says() -> None:
@@ -102,3 +115,43 @@ def test_residuals_compare_the_best_of_each_eta_with_the_best_at_zero() -> None:
     assert float(residual["eta"].max()) == pytest.approx(0.6)
     # sd of ±5 is √50, of the mean of two 5, of a difference of two means √50.
     np.testing.assert_allclose(error, math.sqrt(50))
+
+
+def test_the_interquartile_mean_forgets_the_outer_quarters() -> None:
+    assert interquartile_mean([-1e9, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1e9]) == 3.5
+    assert interquartile_mean([[1.0, 2.0], [3.0, 100.0]]) == 2.5
+
+
+def test_the_probability_of_improvement_compares_every_seed_with_every_other() -> None:
+    # 1 beats none of {2, 2, 2}, 2 ties with all, 3 beats all: (0 + 3 · ½ + 3) / 9.
+    ladder, flat = np.array([[1.0], [2.0], [3.0]]), np.full((3, 1), 2.0)
+    assert improvements(ladder, flat) == pytest.approx(0.5)
+    first = np.array([[1.0, 5.0], [1.0, 5.0]])
+    second = np.array([[2.0, 4.0], [2.0, 4.0]])
+    assert improvements(first, second) == 0.5  # the mean over both tasks
+    assert improvements(second[:, :1], first[:, :1]) == 1.0
+
+
+def test_a_stratified_bootstrap_never_mixes_tasks() -> None:
+    sample = np.array([[1.0, 100.0]] * 5)
+    assert stratified_bootstrap(middle_means, sample, resamples=50) == (50.5, 50.5, 50.5)
+    assert math.isnan(stratified_bootstrap(middle_means, [[1.0, 2.0]]).low)
+    with pytest.raises(ValueError, match=r"must have one shape .* take the seeds that all have"):
+        stratified_bootstrap(improvements, [1.0, 2.0], [1.0, 2.0, 3.0])
+
+
+def test_a_stratified_bootstrap_covers_as_often_as_it_says() -> None:
+    """Of 200 samples of 40 normal numbers 88 … 99 % of the intervals hold 0, false alarm below
+    1e-4 for a method that covers 94 %."""
+    rng = np.random.default_rng(5)
+    samples = rng.normal(size=(200, 40))
+    found = [stratified_bootstrap(middle_means, sample, resamples=300) for sample in samples]
+    assert 0.88 <= np.mean([one.low <= 0 <= one.high for one in found]) <= 0.99
+
+
+def test_the_mistake_rate_of_capped_runs_is_that_of_the_stream() -> None:
+    """Exponential survival at 1 mistake in 500 bins, cut at 400: the estimate from 20,000 runs
+    has a standard deviation of 0.02; six of them, a false alarm below 1e-8."""
+    bins = np.random.default_rng(3).geometric(1 / 500, 20_000) - 1
+    assert mistakes_per_thousand(np.minimum(bins, 400), 400) == pytest.approx(2.0, abs=0.12)
+    assert mistakes_per_thousand([400, 400], 400) == 0.0

@@ -142,3 +142,17 @@ def test_the_settings_of_the_task_are_in_the_protocol() -> None:
     settings = training("mine", "", AXES, rate=0.01, targets=(3,)).settings()
     assert settings["protocol"]["task"]["rate"] == 0.01
     assert settings["protocol"]["task"]["targets"] == [3]
+
+
+def test_copies_differ_in_their_initial_weights_and_copy_0_is_the_neuron_without_copies() -> None:
+    setting = {**GNM_ALL, "pattern_seed": 3}
+    plain, first, second = (
+        make_agent({**setting, **copy}, Task()).weights for copy in ({}, {"copy": 0}, {"copy": 1})
+    )
+    np.testing.assert_array_equal(plain, first)
+    assert not np.array_equal(first, second)
+
+
+def test_a_rule_with_a_field_of_the_name_rule_can_be_trained() -> None:
+    agent = make_agent({"neuron": "gnm", "rule": "chronotron", "pattern_seed": 0}, Task())
+    assert (agent.rule.name, agent.rule.rule) == ("chronotron", "E")
