@@ -29,6 +29,7 @@ VERBS = {
     "train-rl": "train a Stable-Baselines3 agent on the aggregate label",
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",
+    "findings": "ask what the paper could not: run, judge and draw it",
     "figures": "draw the paper's figures from finished experiments",
     "report": "judge the paper's claims and write the report",
     "reference-table": "print every neuron and rule on one to four classes",
