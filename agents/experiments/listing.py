@@ -35,7 +35,7 @@ SUBJECTS = (
 )
 """In the order of the paper, which is that of the report."""
 
-BEYOND = ("memory", "who_wins")
+BEYOND = ("memory", "who_wins", "ceiling")
 """In the order of the page on the findings."""
 
 SIZES = ("quick", "paper")

@@ -129,6 +129,11 @@ def measured_traps(data: xr.Dataset, classes: int, start: str) -> NDArray[np.flo
 
 # --- the hypotheses ------------------------------------------------------------------------------
 
+
+def _counted(classes: int) -> str:
+    return "1 class" if classes == 1 else f"{classes} classes"
+
+
 CLOSE = (0.8, 1.25)
 NEAR = (2 / 3, 3 / 2)
 
@@ -145,7 +150,7 @@ def _judge_trap(results: Results) -> Finding:
             near = np.mean(
                 (measured / predicted[:, 0] >= NEAR[0]) & (measured / predicted[:, 0] <= NEAR[1])
             )
-            name = f"{classes} class{'es' * (classes > 1)}, {start}"
+            name = f"{_counted(classes)}, {start}"
             middle[name] = CLOSE[0] <= ratio.value <= CLOSE[1]
             held[name] = middle[name] and near >= 0.9
             words.append(
@@ -225,8 +230,8 @@ def _judge_need(results: Results) -> Finding:
         )
         share = bootstrap(_memoryless_share, scores)
         held[int(classes)] = share.above(0.8) if classes == 1 else share.below(0.5)
-        words.append(f"{classes} class{'es' * (classes > 1)}: {share:.0%}")
-    conditions = {f"the task has {c} class{'es' * (c > 1)}": holds for c, holds in held.items()}
+        words.append(f"{_counted(classes)}: {share:.0%}")
+    conditions = {f"the task has {_counted(c)}": holds for c, holds in held.items()}
     text = "score without memory (α = 1) as a share of the best α's, PeakError: " + ", ".join(words)
     return Finding(all(held.values()), conditions, (text,))
 
@@ -355,8 +360,7 @@ def _draw_memory(results: Results) -> Figure:
             axes.axvline(best, color=BLUE, lw=0.8, ls="--", zorder=0)
         low.set_ylim(bottom=0)
         _log_alpha(low)
-        word = "class" if classes == 1 else "classes"
-        letter(top, f"{'abcd'[column]}   {classes} {word}")
+        letter(top, f"{'abcd'[column]}   {_counted(classes)}")
     grid[0, 0].set_ylabel("bins survived")
     grid[1, 0].set_ylabel("signal / noise")
     figure.supxlabel("α (decay per bin)", fontsize=8)
@@ -391,7 +395,7 @@ def _draw_trap(results: Results) -> Figure:
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_ticks((0.01, 0.02, 0.05, 0.1), ("0.01", "0.02", "0.05", "0.1"))
         axes.minorticks_off()
-        letter(axes, f"{name}   {classes} class{'es' * (classes > 1)}")
+        letter(axes, f"{name}   {_counted(classes)}")
     grid[0, 0].set_ylabel("α below which ALL is trapped")
     grid[0, 0].legend(fontsize=6, loc="upper left")
     return figure
