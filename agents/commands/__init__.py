@@ -30,6 +30,7 @@ VERBS = {
     "train-rl": "train a Stable-Baselines3 agent on the aggregate label",
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",
+    "findings": "ask what the paper could not: run, judge and draw it",
     "figures": "draw the paper's figures from finished experiments",
     "report": "place agents of your own in the league; or judge the paper's claims",
     "reference-table": "print every neuron and rule on one to four classes",

@@ -24,6 +24,7 @@ EXTRAS = {
     **dict.fromkeys(("roadrunner", "libsbml", "antimony"), "chemistry"),
     **dict.fromkeys(("dask", "distributed"), "cluster"),
     "espeakng_loader": "speech",
+    "cma": "search",
     "matplotlib": "pictures",
     "tornado": "explore",
     **dict.fromkeys(("PIL", "imageio_ffmpeg"), "video"),

@@ -1,23 +1,27 @@
-"""What there is: the subjects of the paper, with their experiments, claims and figures by name.
+"""What there is: the subjects, with their experiments, claims, hypotheses and figures by name.
 
 A subject is a module beside this one that has any of
 
     EXPERIMENTS   {name: function of the size and, if given, of the pattern seeds -> Experiment}
     CLAIMS        the claims of the paper that it judges
+    HYPOTHESES    what is expected beyond the paper, with the rules that judge it
     PICTURES      {name: Picture}
+
+`SUBJECTS` are those of the paper, which `gnm reproduce` runs; `BEYOND` are questions that its
+method could not ask, which `gnm findings` runs.
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
 
 from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.verdict import Claim
+from agents.experiments.verdict import Claim, Hypothesis
 from agents.registry import load_module
 
 SUBJECTS = (
@@ -31,19 +35,24 @@ SUBJECTS = (
 )
 """In the order of the paper, which is that of the report."""
 
+BEYOND = ("memory", "who_wins", "ceiling")
+"""In the order of the page on the findings."""
+
 SIZES = ("quick", "paper")
 
 Builder = Callable[[str, tuple[int, ...] | None], Experiment]
 
 
-def subjects() -> list[ModuleType]:
-    """The modules of all subjects."""
-    return [importlib.import_module(f"agents.experiments.{name}") for name in SUBJECTS]
+def subjects(names: Sequence[str] = SUBJECTS) -> list[ModuleType]:
+    """The modules of the subjects named, by default those of the paper."""
+    return [importlib.import_module(f"agents.experiments.{name}") for name in names]
 
 
-def experiments() -> dict[str, Builder]:
-    """All experiments of the paper, by name."""
-    return {name: build for one in subjects() for name, build in _of(one, "EXPERIMENTS").items()}
+def experiments(names: Sequence[str] = SUBJECTS) -> dict[str, Builder]:
+    """All experiments of these subjects, by name."""
+    return {
+        name: build for one in subjects(names) for name, build in _of(one, "EXPERIMENTS").items()
+    }
 
 
 def claims() -> tuple[Claim, ...]:
@@ -51,9 +60,16 @@ def claims() -> tuple[Claim, ...]:
     return tuple(claim for one in subjects() for claim in getattr(one, "CLAIMS", ()))
 
 
-def pictures() -> dict[str, Picture]:
-    """All figures, by name."""
-    return {name: picture for one in subjects() for name, picture in _of(one, "PICTURES").items()}
+def hypotheses() -> tuple[Hypothesis, ...]:
+    """Every hypothesis beyond the paper."""
+    return tuple(one for subject in subjects(BEYOND) for one in getattr(subject, "HYPOTHESES", ()))
+
+
+def pictures(names: Sequence[str] = SUBJECTS) -> dict[str, Picture]:
+    """All figures of these subjects, by name."""
+    return {
+        name: picture for one in subjects(names) for name, picture in _of(one, "PICTURES").items()
+    }
 
 
 def _of(subject: ModuleType, what: str) -> dict[str, Any]:
@@ -62,7 +78,7 @@ def _of(subject: ModuleType, what: str) -> dict[str, Any]:
 
 
 def experiment(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
-    """The experiment `name` at `size`: one of the paper's, or your own.
+    """The experiment `name` at `size`: one of those here, or your own.
 
     Your own is given as "module:name" or "path/to/file.py:name": an Experiment, or a function of
     the size and the pattern seeds (None: its own) that makes one. Raises ValueError if there is
@@ -70,7 +86,7 @@ def experiment(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Ex
     """
     place, _, attribute = name.rpartition(":")
     if not place:
-        known = experiments()
+        known = experiments((*SUBJECTS, *BEYOND))
         if name not in known:
             raise ValueError(
                 f"there is no experiment {name!r}: choose one of {', '.join(known)}; yours is "

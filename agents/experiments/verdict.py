@@ -1,4 +1,4 @@
-"""A claim of the paper, the rule that judges it, and what came out.
+"""A claim of the paper or a hypothesis of our own, the rule that judges it, and what came out.
 
 Rules are fixed before the runs that they judge, and a verdict follows from the numbers alone.
 """
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 MISSING = "missing"
+HOLDS = "holds"
+DOES_NOT_HOLD = "does not hold"
 
 Results: TypeAlias = "Mapping[str, xr.Dataset]"
 """Finished stores by the name of their experiment."""
@@ -41,12 +43,16 @@ class Finding:
     @property
     def verdict(self) -> str:
         """Reproduced, reproduced if …, not reproduced, or missing."""
+        return self.worded(REPRODUCED, NOT_REPRODUCED)
+
+    def worded(self, yes: str, no: str) -> str:
+        """The verdict in the words `yes`, `yes` with its conditions, `no`, or missing."""
         if not self.judged:
             return MISSING
         if self.holds:
-            return REPRODUCED
+            return yes
         kept = [condition for condition, holds in self.conditions.items() if holds]
-        return f"{REPRODUCED} if {', or '.join(kept)}" if kept else NOT_REPRODUCED
+        return f"{yes} if {', or '.join(kept)}" if kept else no
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,38 @@ class Claim:
     def finding(self, results: Results) -> Finding | None:
         """What the rule finds; None if a store that it needs is not there."""
         return self.judge(results) if all(name in results for name in self.needs) else None
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What we expect beyond the paper, written down with its rule before the run.
+
+    Attributes:
+        id: such as "M1".
+        words: what is expected.
+        because: on what grounds, known before the run.
+        protocol: what is run.
+        rule: when it counts as holding, in words.
+        needs: experiments whose stores the rule reads.
+        judge: the rule.
+    """
+
+    id: str
+    words: str
+    because: str
+    protocol: str
+    rule: str
+    needs: tuple[str, ...]
+    judge: Callable[[Results], Finding]
+
+    def finding(self, results: Results) -> Finding | None:
+        """What the rule finds; None if a store that it needs is not there."""
+        return self.judge(results) if all(name in results for name in self.needs) else None
+
+    def verdict(self, results: Results) -> str:
+        """Holds, holds if …, does not hold, or missing."""
+        finding = self.finding(results)
+        return finding.worded(HOLDS, DOES_NOT_HOLD) if finding else MISSING
 
 
 class Tried(NamedTuple):
