@@ -42,7 +42,11 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 script, sys.argv = sys.argv[1], sys.argv[1:]
 sys.path.insert(0, sys.argv[0].rpartition("/")[0])
-runpy.run_path(script, run_name="__main__")
+try:
+    runpy.run_path(script, run_name="__main__")
+except SystemExit as ended:
+    if ended.code:
+        raise
 print(json.dumps(len(compiled)))
 """
 

@@ -230,7 +230,7 @@ class TestBadInput:
             ({"n_classes": 0}, "n_classes must be >= 1, got 0"),
             ({"rat": 0.1}, "unknown keyword 'rat'"),
             ({"task": Task(), "rate": 0.1}, "give either task or its fields"),
-            ({"task": "task"}, "task must be a gnm_env.Task, got str"),
+            ({"task": "task"}, "task must be a gnm_env.Task, got 'task'"),
             ({"patterns": np.zeros((1, 50, 100))}, "use Patterns.from_dense"),
             ({"patterns": Patterns.draw(Task(n_classes=2), 0)}, "patterns must have shape"),
             ({"pattern_seed": -1}, "pattern_seed must be >= 0"),
