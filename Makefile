@@ -96,7 +96,7 @@ $(VENV)/.for-explore: $(NEEDS)
 
 $(VENV)/.for-test: $(NEEDS)
 	@echo "Installing what the tests need into $(VENV); with torch this takes minutes ..."
-	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,cluster,recordings,docs,explore,video,dev]"
+	@$(INSTALL) -e ".[pictures,rendering,rl,chemistry,reproduce,search,cluster,recordings,speech,docs,explore,video,dev]"
 	@touch $(VENV)/.for-train $(VENV)/.for-explore $(VENV)/.for-reproduce $(VENV)/.for-league $(VENV)/.for-docs $@
 
 $(VENV)/.for-benchmark: $(NEEDS)
