@@ -44,6 +44,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "threads": ("training:threads",),
     "heat-map": ("training:heat_map",),
     "loop": ("training:loop",),
+    "data-sets": ("data_sets:data_sets",),
     "others": ("others:forward", "others:learning_trials"),
     "environments": ("environments:single", "environments:vector"),
     "rl": ("learners:reinforcement",),
