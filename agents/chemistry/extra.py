@@ -13,5 +13,5 @@ def optional(module: str) -> Any:
     except ImportError as error:
         raise ImportError(
             f"the chemistry needs {module}, which is not installed ({error}); "
-            'install the extra: pip install -e ".[chemistry]"'
+            'install the extra: pip install "gnm-env[chemistry]"'
         ) from None

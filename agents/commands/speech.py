@@ -25,6 +25,8 @@ from gnm_env.speech.phrases import SIZES, balanced, counting, digits, make_digit
 from gnm_env.speech.voices import DIGITS
 
 SPLITS = ("train", "test", "near", "stream")
+KNOWN = (*speech.LEARNERS, speech.PPO)
+"""Learners by their names in the table."""
 
 
 def options(parser: Parser) -> None:
@@ -32,12 +34,19 @@ def options(parser: Parser) -> None:
     add("what", choices=("run", "make"), nargs="?", default="run")
     add("--word", choices=DIGITS, default="seven", help="the word to be counted (default seven)")
     add("--phrases", type=Path, metavar="FILE", help="(default those that ship with the project)")
-    known = ", ".join(f"'{name}'" for name in speech.LEARNERS)
+    known = ", ".join(f"'{name}'" for name in KNOWN)
     add(
         "--learner", action="append", metavar="NAME", help=f"of {known}, or all (default the first)"
     )
     add("--restarts", type=at_least(1), default=speech.RESTARTS, metavar="N")
     add("--epochs", type=at_least(1), default=speech.EPOCHS, metavar="N")
+    add(
+        "--ppo-bins",
+        type=at_least(1),
+        default=speech.PPO_BINS,
+        metavar="N",
+        help="bins that PPO hears (default 8,000,000: some minutes)",
+    )
     share(parser, "--runs", default=1, help="selections to take the median of")
     for split, size in SIZES.items():
         add(
@@ -88,6 +97,9 @@ def _run(options: argparse.Namespace) -> dict[str, Any]:
     delayed = {split: one.delayed(speech.DELAYS) for split, one in splits.items()}
     rows, best = speech.control_rows(splits), None
     for name in _learners(options.learner):
+        if name == speech.PPO:
+            rows.append(speech.ppo_row(delayed, options.ppo_bins, options.seed))
+            continue
         learner = speech.LEARNERS[name]
         agents = speech.train(
             learner, delayed["train"],
@@ -106,24 +118,20 @@ def _run(options: argparse.Namespace) -> dict[str, Any]:
         shares = " ".join(f"{share:.1%}" for share in sorted(selections))
         print(f"{speech.FIRST}, {options.runs} selections on test voices: {shares}")
         print(f"median {np.median(selections):.1%}")
-    assert best is not None
+    told = {"rows": [asdict(row) for row in rows], "selections": selections}
+    if best is None:
+        return told
     figure = speech.draw(best[1], splits["test"], speech.shown_phrase(splits["test"]))
     folder = options.out or Path("runs/speech")
     picture = save(figure, folder, f"speech-{options.word}", ("png",))["png"]
     print(f"picture {picture}")
-    return {
-        "rows": [asdict(row) for row in rows],
-        "selections": selections,
-        "picture": str(picture),
-    }
+    return {**told, "picture": str(picture)}
 
 
 def _learners(given: list[str] | None) -> list[str]:
     """The learners asked for. ValueError if there is no such one."""
     wanted = given or [speech.FIRST]
     for name in wanted:
-        if name not in (*speech.LEARNERS, "all"):
-            raise ValueError(
-                f"learner must be one of {', '.join(speech.LEARNERS)} or all, got {name}"
-            )
-    return list(speech.LEARNERS) if "all" in wanted else wanted
+        if name not in (*KNOWN, "all"):
+            raise ValueError(f"learner must be one of {'; '.join(KNOWN)}; or all, got {name}")
+    return list(KNOWN) if "all" in wanted else wanted

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 import agents.learning  # noqa: F401  (registers the rules)
 from agents import registry
 from agents.evaluation import answers
+from agents.network import BackPropagation, Network, NetworkAgent
 from agents.neuron_agent import NeuronAgent
 from agents.neurons.gnm import GNM
 from agents.neurons.mst import MST
 from agents.recording import record
 from agents.training.many import train_many
 from gnm_env import Trials
-from gnm_env.speech.phrases import BIN, DIGITS
+from gnm_env.speech.phrases import BIN, DIGITS, located
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,10 +124,33 @@ class Learner:
         return NeuronAgent(self.neuron, rule, n_inputs, seed, self.initial_weight, self.bounds)
 
 
+@dataclass(frozen=True)
+class NetworkLearner:
+    """A network with a hidden layer: told where each word was, since BP has to know.
+
+    Attributes:
+        network: its size and parameters.
+        learning_rate: of both layers, falling to 0.
+        initial_weight: largest initial weight.
+    """
+
+    network: Network
+    learning_rate: float
+    initial_weight: float
+
+    def agent(self, n_inputs: int, seed: int, trials: int) -> NetworkAgent:
+        """A new agent, to be trained on so many trials."""
+        rate = self.learning_rate
+        rule = BackPropagation(
+            learning_rate_hidden=rate, learning_rate_output=rate, decay_trials=trials
+        )
+        return NetworkAgent(self.network, rule, n_inputs, seed, self.initial_weight)
+
+
 SLOW_MST = MST(tau_m=10.0, tau_s=2.5)
 """τ_m 50 ms, τ_s 12.5 ms."""
 TUNED_GNM = GNM(alpha=0.1)
-LEARNERS: dict[str, Learner] = {
+LEARNERS: dict[str, Learner | NetworkLearner] = {
     f"{name}, {title}": Learner(neuron, rule, settings)
     for name, neuron in (("MST", SLOW_MST), ("GNM", TUNED_GNM))
     for title, rule, settings in (
@@ -134,15 +158,20 @@ LEARNERS: dict[str, Learner] = {
         ("MPDAL", "mpdal", {"learning_rate": 3e-4, "momentum": 0.5}),
         ("ALL", "all", {"learning_rate": 1e-5, "momentum": 0.9, "fraction": 0.2}),
     )
-}
+} | {"network, BP, told where": NetworkLearner(Network(alpha=0.1), 1e-2, 0.1)}
 """By the name in the table; settings were chosen on a sixth of the training speakers, held out."""
 FIRST = next(iter(LEARNERS))
 """The one that the example trains unless told otherwise."""
 
 
 def train(
-    learner: Learner, phrases: Trials, *, restarts: int, epochs: int, seed: int = 0
-) -> list[NeuronAgent]:
+    learner: Learner | NetworkLearner,
+    phrases: Trials,
+    *,
+    restarts: int,
+    epochs: int,
+    seed: int = 0,
+) -> list[NeuronAgent | NetworkAgent]:
     """`restarts` agents trained side by side, the best in training first.
 
     All hear the same phrases in the same order; `seed` is of that order, and the initial weights
@@ -150,13 +179,19 @@ def train(
     """
     trials = epochs * len(phrases)
     agents = [learner.agent(phrases.n_inputs, seed + k, trials) for k in range(restarts)]
-    train_many(agents, phrases, trials=trials, seed=seed)
+    told = located(phrases) if isinstance(learner, NetworkLearner) else phrases
+    train_many(agents, told, trials=trials, seed=seed)
     order = np.argsort(answers(agents, phrases).wrong, kind="stable")
     return [agents[k] for k in order]
 
 
 def selected(
-    learner: Learner, splits: Mapping[str, Trials], *, runs: int, restarts: int, epochs: int
+    learner: Learner | NetworkLearner,
+    splits: Mapping[str, Trials],
+    *,
+    runs: int,
+    restarts: int,
+    epochs: int,
 ) -> list[float]:
     """Share of test phrases counted exactly by each of `runs` selections of the best in training.
 
@@ -169,7 +204,7 @@ def selected(
     return [exact(agent, splits["test"]).exact for agent in best]
 
 
-def exact(agent: NeuronAgent, phrases: Trials) -> Score:
+def exact(agent: Any, phrases: Trials) -> Score:
     """The score of an agent."""
     result = answers(agent, phrases)
     return Score(
@@ -229,7 +264,7 @@ def latency_of(spikes: Sequence[NDArray[np.int64]], phrases: Trials) -> int:
     return LATENCIES[int(np.argmax(recalls))]
 
 
-def spike_bins(agent: NeuronAgent, phrases: Trials) -> list[NDArray[np.int64]]:
+def spike_bins(agent: NeuronAgent | NetworkAgent, phrases: Trials) -> list[NDArray[np.int64]]:
     """The bins of the output spikes of each phrase."""
     return [np.flatnonzero(record(agent, trial).spikes) for trial in phrases]
 
@@ -269,7 +304,9 @@ def control_rows(splits: Mapping[str, Trials]) -> list[Row]:
     ]
 
 
-def neuron_row(name: str, agents: Sequence[NeuronAgent], splits: Mapping[str, Trials]) -> Row:
+def neuron_row(
+    name: str, agents: Sequence[NeuronAgent | NetworkAgent], splits: Mapping[str, Trials]
+) -> Row:
     """The line of a learner, from its trained agents, the best in training first.
 
     `splits` are delayed as the agents want them.
@@ -287,6 +324,27 @@ def neuron_row(name: str, agents: Sequence[NeuronAgent], splits: Mapping[str, Tr
         timing(spikes, test, latency, mirrored=True),
         [exact(agent, test).exact for agent in agents],
     )
+
+
+PPO = "PPO, told the label"
+PPO_BINS = 8_000_000
+"""Bins that PPO hears: some three times each training phrase."""
+
+
+def ppo_row(splits: Mapping[str, Trials], bins: int = PPO_BINS, seed: int = 0) -> Row:
+    """The line of a PPO agent with the settings of `agents.rl`, told the label and nothing else.
+
+    Trained once: it takes minutes. `splits` are delayed, as for a neuron, and of each it hears
+    traces too. Needs the extra `rl`.
+    """
+    from agents.rl import SB3Agent, make_rl_agent, training_env
+
+    train = splits["train"]
+    env = training_env(train, kind="ppo")
+    agent = SB3Agent(make_rl_agent("ppo", env, seed).learn(bins), train)
+    env.close()
+    scores = {split: exact(agent, phrases) for split, phrases in splits.items() if split != "train"}
+    return Row(PPO, exact(agent, train).exact, scores)
 
 
 def text_table(rows: Sequence[Row]) -> str:
@@ -317,7 +375,7 @@ def shown_phrase(phrases: Trials) -> int:
     return int(np.argmax(phrases.labels))
 
 
-def draw(agent: NeuronAgent, phrases: Trials, number: int) -> Figure:
+def draw(agent: NeuronAgent | NetworkAgent, phrases: Trials, number: int) -> Figure:
     """One phrase: what is heard, the potential and the spikes, and where the words are.
 
     Args:
@@ -339,7 +397,7 @@ def draw(agent: NeuronAgent, phrases: Trials, number: int) -> Figure:
         raster.plot(t[bins], trial.channels / 4, "|", color="0.2", ms=3, mew=0.7)
         raster.set(ylabel="band (4 channels each)", ylim=(-0.5, trial.n_inputs / 4))
         potential.plot(t, course.V, color="black", lw=0.9)
-        threshold = agent.neuron.threshold
+        threshold = agent.model.threshold
         potential.axhline(threshold, color=GREY, lw=0.8, ls="--")
         top = 1.15 * max(float(course.V.max()), threshold)
         spikes = t[course.spikes]

@@ -2,7 +2,7 @@
 
 The compiled network needs numpy and numba alone. `NetworkModule`, the same network as a
 torch.nn.Module, and what goes with it are imported at their first use; they need torch,
-`pip install -e ".[rl]"`.
+`pip install "gnm-env[rl]"`.
 """
 
 from __future__ import annotations
@@ -31,6 +31,6 @@ def __getattr__(name: str) -> Any:
         module = importlib.import_module("agents.network.module")
     except ModuleNotFoundError as error:
         raise ImportError(
-            f'{name} needs torch, and {error.name} is missing: pip install -e ".[rl]"'
+            f'{name} needs torch, and {error.name} is missing: pip install "gnm-env[rl]"'
         ) from error
     return getattr(module, name)

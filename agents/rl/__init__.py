@@ -1,6 +1,6 @@
 """Reinforcement learning on the same stream: Stable-Baselines3's algorithms, and their scoring.
 
-Needs torch, Stable-Baselines3 and sb3-contrib: `pip install -e ".[rl]"`.
+Needs torch, Stable-Baselines3 and sb3-contrib: `pip install "gnm-env[rl]"`.
 """
 
 try:
@@ -10,7 +10,7 @@ try:
 except ImportError as error:
     raise ImportError(
         f"agents.rl needs torch, stable-baselines3 and sb3-contrib, and {error.name} is missing: "
-        'pip install -e ".[rl]"'
+        'pip install "gnm-env[rl]"'
     ) from error
 
 from agents.rl.checkpoint import load, save

@@ -30,8 +30,10 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from agents.rl.memory import LeakyPolicy, LstmPolicy
 from agents.rl.observation import ObservationConfig
 from agents.rl.vec_env import PatternVecEnv
+from agents.training.source import DataSource, source_of
 from gnm_env.checks import choice, real, whole
-from gnm_env.task import Patterns, Task, task_arrays
+from gnm_env.task import Patterns, Task
+from gnm_env.trials import Trials
 
 FILE = Path(__file__).with_suffix(".toml")
 """Every kind's hyperparameters: none of them stands in code."""
@@ -127,8 +129,8 @@ HYPERPARAMETERS: dict[str, Hyperparameters] = read_hyperparameters()
 
 
 def training_env(
-    task: Task,
-    patterns: Patterns,
+    task: Task | Trials,
+    patterns: Patterns | None = None,
     kind: str = "ppo",
     *,
     feedback: str = "cost",
@@ -137,21 +139,25 @@ def training_env(
     """PatternTrial environments side by side, as SB3 takes them, seen as `kind` needs it.
 
     Args:
-        task, patterns: the world.
+        task, patterns: the world; or a data set of trials in place of both.
         kind: a key of `HYPERPARAMETERS`.
         feedback: "cost" or "dense", see `PatternTrialEnv`.
         n_envs: their number; None: the kind's.
     """
     chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
     choice("feedback", feedback, ("cost", "dense"))
-    task_arrays(task, patterns)  # refuses what does not belong together
+    source = source_of(task, patterns)  # refuses what does not belong together
+    heard = (
+        {"trials": source.data}
+        if isinstance(source, DataSource)
+        else {"task": task, "patterns": patterns}
+    )
     n_envs = chosen.n_envs if n_envs is None else whole("n_envs", n_envs, low=1)
     envs = gym.make_vec(
         "gnm/PatternTrial-v0",
         num_envs=n_envs,
         vectorization_mode="vector_entry_point",
-        task=task,
-        patterns=patterns,
+        **heard,
         feedback=feedback,
         autoreset_mode=gym.vector.AutoresetMode.SAME_STEP,
     )

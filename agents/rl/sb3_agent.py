@@ -14,6 +14,7 @@ from agents.rl.observation import RAW, ObservationConfig
 from agents.training.agent import bits_of, checked_begins
 from gnm_env.checks import shown
 from gnm_env.task import Task
+from gnm_env.trials import Trials
 
 
 class Memory(NamedTuple):
@@ -34,7 +35,8 @@ class SB3Agent(PolicyAgent):
         policy: an SB3 model, or anything with its `predict`, of any framework. Two attributes are
             looked at where they are there: `observation_space`, and `observation_config`, which the
             models of `make_rl_agent` have and their zips keep.
-        task: the task that it was trained on; tells the number and the rate of the inputs.
+        task: the task, or the data set of trials, that it was trained on; tells the number and the
+            rate of the inputs.
         observation: what the policy is shown; None: what its `observation_config` says, or the raw
             bits.
 
@@ -44,23 +46,25 @@ class SB3Agent(PolicyAgent):
     """
 
     def __init__(
-        self, policy: Any, task: Task, observation: ObservationConfig | None = None
+        self, policy: Any, task: Task | Trials, observation: ObservationConfig | None = None
     ) -> None:
         if isinstance(policy, type) or not callable(getattr(policy, "predict", None)):
             raise ValueError(
                 "policy must be an SB3 model, or anything with its predict(observation, state, "
                 f"episode_start, deterministic), got {shown(policy)}"
             )
-        if not isinstance(task, Task):
+        if not isinstance(task, Task | Trials):
             raise ValueError(
-                f"task must be the gnm_env.Task that the policy was trained on, got {shown(task)}"
+                "task must be the gnm_env.Task, or the gnm_env.Trials, that the policy was trained "
+                f"on, got {shown(task)}"
             )
         self.policy = policy
         self.task = task
         self.observation = _agreed(policy, observation)
         self.n_inputs = task.n_inputs
         bits = spaces.Box(0, 1, (task.n_inputs,), np.int8)
-        self._traces = self.observation.traces(1, bits, task.rate)
+        self.rate = task.rate if isinstance(task, Task) else float(task.rates.mean())
+        self._traces = self.observation.traces(1, bits, self.rate)
         self._require_space(bits if self._traces is None else self._traces.space)
         self.begin_trial()
 
@@ -76,7 +80,7 @@ class SB3Agent(PolicyAgent):
             k = int(np.argmax(~np.isclose(space.high, own.high, rtol=1e-4)))
             raise ValueError(
                 f"the policy was trained on observations up to {space.high[k]:.4g} (entry {k}), "
-                f"and {self.observation} of inputs of rate {self.task.rate:g} gives up to "
+                f"and {self.observation} of inputs of rate {self.rate:g} gives up to "
                 f"{own.high[k]:.4g}: give the task and the config that it was trained on, the "
                 "scale included"
             )

@@ -6,7 +6,16 @@ installs.
 """
 
 from gnm_env.speech.encoder import CHANNELS, centres, encode, envelopes, read_wav
-from gnm_env.speech.phrases import BIN, counting, digits, make, make_digits, part, trial_of
+from gnm_env.speech.phrases import (
+    BIN,
+    counting,
+    digits,
+    located,
+    make,
+    make_digits,
+    part,
+    trial_of,
+)
 from gnm_env.speech.voices import DIGITS
 
 __all__ = [
@@ -18,6 +27,7 @@ __all__ = [
     "digits",
     "encode",
     "envelopes",
+    "located",
     "make",
     "make_digits",
     "part",

@@ -222,6 +222,34 @@ def counting(phrases: Trials, word: int) -> Trials:
     )
 
 
+def located(phrases: Trials) -> Trials:
+    """The same phrases, and where in each the counted word is: a presentation that owes one spike.
+
+    For learners that are told more than the label.
+    """
+    word = DIGITS.index(phrases.metadata["word"])
+    columns = (phrases.columns[name] for name in ("words", "onsets", "ends"))
+    places = [
+        [(onset, end) for said, onset, end in zip(*of_one, strict=True) if said == word]
+        for of_one in zip(*columns, strict=True)
+    ]
+    onsets, ends = np.array([place for of_one in places for place in of_one]).reshape(-1, 2).T
+    a = phrases.arrays
+    return Trials.from_arrays(
+        phrases.n_inputs,
+        phrases.n_bins,
+        phrases.n_spikes,
+        a.channels,
+        a.bins,
+        presentations=[len(of_one) for of_one in places],
+        onsets=onsets,
+        ends=ends,
+        targets=np.ones(len(onsets), np.int64),
+        columns=phrases.columns,
+        metadata=phrases.metadata,
+    )
+
+
 def balanced(phrases: Trials, seed: int = 0) -> Trials:
     """The phrases without so many of label 0 that in each split there are no more than of label 1.
 

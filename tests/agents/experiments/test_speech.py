@@ -11,6 +11,7 @@ import pytest
 from agents import NeuronAgent
 from agents.experiments import speech
 from agents.experiments.speech import Timing, latency_of, score, timing
+from agents.network import Network
 from gnm_env import Trial, Trials
 from gnm_env.speech import digits, part
 
@@ -127,3 +128,20 @@ def test_a_phrase_is_drawn_with_its_words_named() -> None:
     assert named.count("seven") == 2
     raster = figure.axes[0].lines[0]
     assert len(raster.get_xdata()) == phrases.n_spikes[number]
+
+
+def test_a_network_learns_where_the_word_is_and_is_scored_on_the_label() -> None:
+    learner = speech.NetworkLearner(Network(hidden=2), 1e-2, 0.3)
+    agents = speech.train(learner, MADE, restarts=2, epochs=5)
+    scores = [speech.exact(agent, MADE).exact for agent in agents]
+    assert scores == sorted(scores, reverse=True)
+    assert scores[0] > score(speech.constant(MADE, MADE), MADE.labels).exact
+    assert agents[0].weights.shape == (6 * 2 + 2,)
+
+
+def test_ppo_hears_the_phrases_and_is_scored_like_the_others() -> None:
+    pytest.importorskip("stable_baselines3")
+    row = speech.ppo_row({"train": MADE, "test": MADE[:50]}, bins=16_384)
+    assert row.name == speech.PPO and set(row.scores) == {"test"}
+    assert 0 <= row.train <= 1 and 0 <= row.scores["test"].exact <= 1
+    assert row.timing is None and speech.text_table([row]).splitlines()[-1].startswith("PPO")

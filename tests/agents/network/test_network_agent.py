@@ -261,4 +261,6 @@ except ImportError as error:
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
-    assert 'NetworkModule needs torch, and torch is missing: pip install -e ".[rl]"' in run.stdout
+    assert (
+        'NetworkModule needs torch, and torch is missing: pip install "gnm-env[rl]"' in run.stdout
+    )

@@ -29,7 +29,7 @@ def test_the_missing_extra_is_named(missing):
         timeout=120,
     )
     assert run.returncode == 0, run.stderr
-    assert 'pip install -e ".[rl]"' in run.stdout
+    assert 'pip install "gnm-env[rl]"' in run.stdout
     assert missing[0] in run.stdout
 
 

@@ -15,11 +15,19 @@ import torch
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, train_many
+from agents import GNM, AggregateLabel, NeuronAgent, answers, noisy_performance, train_many
 from agents.policy import PolicyBatch
-from agents.rl import HYPERPARAMETERS, RAW, TRACES, ObservationConfig, SB3Agent, make_rl_agent
+from agents.rl import (
+    HYPERPARAMETERS,
+    RAW,
+    TRACES,
+    ObservationConfig,
+    SB3Agent,
+    make_rl_agent,
+    training_env,
+)
 from agents.training.source import TaskSource
-from gnm_env import Patterns, Task
+from gnm_env import Patterns, Task, Trials
 from gnm_env.wrappers import SeededEpisodes
 
 TASK = Task(onset_probability=0.05)
@@ -160,6 +168,17 @@ def test_a_policy_that_says_what_it_was_trained_on_need_not_be_told() -> None:
         HYPERPARAMETERS["recurrent-ppo"].observation
     )
     assert SB3Agent(Recorder(), TASK).observation == RAW
+
+
+def test_a_policy_hears_a_data_set_as_it_heard_it_in_training() -> None:
+    trials = Trials.draw(TASK, PATTERNS, 8, seed=3)
+    env = training_env(trials, kind="ppo", n_envs=2)
+    agent = SB3Agent(make_rl_agent("ppo", env), trials)
+    assert agent.rate == trials.rates.mean()
+    assert answers(agent, trials).trials == 8
+    env.close()
+    with pytest.raises(ValueError, match="takes the place of task and patterns"):
+        training_env(trials, PATTERNS)
 
 
 @pytest.mark.parametrize("policy", [None, 3, "x", {}, Recorder], ids=str)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gnm_env import Trials
-from gnm_env.speech import DIGITS, counting, digits, make, part
+from gnm_env.speech import DIGITS, counting, digits, located, make, part
 from gnm_env.speech.phrases import SHIPPED, STREAM_WORDS, balanced, draw_phrase, word_bins
 from gnm_env.speech.voices import clusters, distances, split_voices
 from gnm_env.trial import Trial
@@ -140,6 +140,19 @@ def test_too_many_test_voices_are_refused() -> None:
         split_voices(made_distances(), n_test=10, n_near=1, bound=0.5, seed=0)
     with pytest.raises(ValueError, match=r"only 4 voices are 0\.5 away from all test voices"):
         split_voices(made_distances(), n_test=9, n_near=4, bound=0.5, seed=0)
+
+
+def test_located_phrases_owe_one_spike_where_each_counted_word_is() -> None:
+    phrases = part(digits(), "test")[:20]
+    where = located(phrases)
+    assert where.labels.tolist() == phrases.labels.tolist() and where.columns == phrases.columns
+    assert not where.label_only.any()
+    for trial, words, onsets, ends in zip(
+        where, *(phrases.columns[name] for name in ("words", "onsets", "ends")), strict=True
+    ):
+        sevens = [k for k, word in enumerate(words) if word == 7]
+        assert trial.onsets.tolist() == [onsets[k] for k in sevens]
+        assert trial.ends.tolist() == [ends[k] for k in sevens]
 
 
 # --- synthesis -----------------------------------------------------------------------------------
