@@ -5,6 +5,7 @@
     gnm league --part rl --seeds 100-104 --jobs 4
     gnm league --part rules --size full      every rule on every neuron, tuned alike
     gnm league --rules critical all --neurons GNM MST
+    gnm league --trials mine.npz     the same neurons and rules on a data set of yours
 
 All hear the same patterns and are scored on the same streams; they are compared at the same number
 of bins heard, and with each one's whole budget. Each training is one process, and one block of the
@@ -17,18 +18,20 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from agents.commands.terminal import RESULTS, Parser, at_least, share
-from agents.experiments import ranking, tuning
+from agents.experiments import own_data, ranking, tuning
 from agents.experiments.design import Experiment
 from agents.experiments.league import PARTS, draw, league, read_league, rows, text_table
+from agents.experiments.progress import Progress
 from agents.experiments.store import read
 from agents.experiments.sweep import sweep
+from gnm_env import Trials
 from gnm_env.files import atomic_write
 
 RESUMES = True
@@ -52,6 +55,12 @@ def options(parser: Parser) -> None:
         f"{', '.join(tuning.NEURONS)}")  # fmt: skip
     add("--tune", action="store_true", help="of the part rules: search the settings first; they "
         "then stand in the folder, in place of those that come with the package")  # fmt: skip
+    add("--trials", type=Path, metavar="FILE", help="a data set, as `Trials.save` writes it: train "
+        "every rule on 80 %% of it, score it on the rest")  # fmt: skip
+    add("--by", metavar="COLUMN", help="of --trials: keep together what is alike in this column")
+    add("--epochs", type=at_least(1), default=own_data.EPOCHS, metavar="N", help="of --trials: how "
+        f"often each trial is heard (default {own_data.EPOCHS})")  # fmt: skip
+    share(parser, "--seed", help="of --trials: of the split and of all that is drawn")
     add("--jobs", type=at_least(1), default=1, metavar="N", help="trainings at a time (default 1)")
     add("--steps", type=at_least(1), metavar="N", help="bins that RL agents hear, to try it out")
     share(parser, "--out", help=f"(default {RESULTS}/league/SIZE)")
@@ -62,6 +71,10 @@ def options(parser: Parser) -> None:
 
 def main(options: argparse.Namespace) -> dict[str, Any]:
     """Compute what is missing, then print and draw what is there."""
+    if options.trials is not None:
+        return _on_trials(options)
+    if options.by is not None:
+        raise ValueError("--by belongs to --trials FILE: add it, or leave --by out")
     folder = options.out or RESULTS / "league" / options.size
     chosen_rows = options.rules is not None or options.neurons is not None
     parts = options.part or ([RULES] if chosen_rows or options.tune else PARTS)
@@ -94,6 +107,31 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     elif not results:
         raise ValueError(f"there is no league in {folder}: leave --so-far out to train one")
     return told
+
+
+def _on_trials(options: argparse.Namespace) -> dict[str, Any]:
+    """Rank neurons and rules on a data set, print the table and keep it."""
+    trials = Trials.load(options.trials)
+    print(trials)
+
+    def shown(names: Iterable[str]) -> Iterator[str]:
+        todo = list(names)
+        with Progress("training", len(todo), unit="entries") as progress:
+            for name in todo:
+                yield name
+                progress.advance()
+
+    found = own_data.rank(
+        trials, options.neurons, options.rules,
+        epochs=options.epochs, seed=options.seed, by=options.by, progress=shown,
+    )  # fmt: skip
+    text = own_data.markdown(found)
+    print(text)
+    path = (options.out or RESULTS / "league" / options.trials.stem) / "trials.md"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as file:
+        file.write(text.encode())
+    return {"table": str(path), "rows": [row._asdict() for row in found]}
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from agents import noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Coordinate, Experiment, Setting, Variable
 from agents.experiments.models import new_agent
 from agents.registry import find_model, find_rule
-from gnm_env import Patterns, Task
+from gnm_env import Patterns, Task, Trials
 from gnm_env.checks import MAX_BINS, flag, shown, whole
 from gnm_env.levels import evaluation_seed
 from gnm_env.task import MAX_CLASSES
@@ -82,8 +82,8 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
     }
 
 
-def make_agent(setting: Setting, task: Task) -> Any:
-    """The untrained agent that a setting describes."""
+def make_agent(setting: Setting, task: Task | Trials) -> Any:
+    """The untrained agent that a setting describes, with the inputs of a task or of a data set."""
     # "neuron" and "rule" name classes, whatever fields of these names a class may have.
     given = setting.keys() - {"neuron", "rule"}
     neuron, rule = (

@@ -1,0 +1,77 @@
+"""The league on a data set: trained on a part, scored on the rest, what cannot learn it is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from agents import answers
+from agents.commands import league
+from agents.commands.terminal import parse
+from agents.experiments import own_data
+from agents.experiments.training import make_agent
+from agents.experiments.tuning import chosen_settings, for_trials
+from agents.training.many import train_many
+from gnm_env import Patterns, Task, Trials
+
+TASK = Task(onset_probability=0.05)
+KNOWN = Trials.draw(TASK, Patterns.draw(TASK, 3), 200, seed=5)
+
+
+def labels_only(trials: Trials) -> Trials:
+    a = trials.arrays
+    return Trials.from_arrays(
+        a.n_inputs, trials.n_bins, trials.n_spikes, a.channels, a.bins, labels=trials.labels
+    )
+
+
+def by_name(rows: list[own_data.Row]) -> dict[str, own_data.Row]:
+    return {row.name: row for row in rows}
+
+
+def test_a_row_is_what_training_by_hand_gives() -> None:
+    row = by_name(own_data.rank(KNOWN, ["GNM"], ["ALL"], epochs=3, copies=2))["GNM, ALL"]
+    train, test = KNOWN.split(0.8, seed=0)
+    setting = for_trials(chosen_settings()["GNM, ALL"], 3 * len(train))
+    agents = [make_agent({**setting, "pattern_seed": 0, "copy": k}, train) for k in range(2)]
+    train_many(agents, train, trials=3 * len(train), seed=0)
+    result = answers(agents, test)
+    assert row.exact == tuple((1 - result.wrong / len(test)).tolist())
+    assert row.mean_error == pytest.approx(result.absolute.mean() / len(test))
+
+
+def test_silence_and_the_commonest_label_stand_beside_them_best_first() -> None:
+    rows = own_data.rank(KNOWN, ["GNM"], ["ALL"], epochs=1, copies=1)
+    train, test = KNOWN.split(0.8, seed=0)
+    assert by_name(rows)["silence"].exact == (np.mean(test.labels == 0),)
+    commonest = int(np.bincount(train.labels).argmax())
+    name = f"always {commonest}, the commonest label"
+    assert by_name(rows)[name].exact == (np.mean(test.labels == commonest),)
+    exact = [float(np.mean(row.exact)) for row in rows]
+    assert exact == sorted(exact, reverse=True)
+
+
+def test_a_rule_that_has_to_know_more_is_told_with_the_reason() -> None:
+    rows = own_data.rank(labels_only(KNOWN), ["GNM"], ["ET"], epochs=1, copies=1)
+    refused = [row for row in rows if row.refused]
+    assert {row.name for row in refused} == {"GNM, ET", "GNM, ET, modulated"}
+    assert "presentations" in refused[0].refused
+    text = own_data.markdown(rows)
+    assert text.splitlines()[-1] == f"- GNM, ET; GNM, ET, modulated: {refused[0].refused}"
+
+
+def test_the_command_ranks_a_file_and_keeps_the_table(tmp_path: Path) -> None:
+    KNOWN.save(tmp_path / "mine.npz")
+    words: list[Any] = ["--trials", tmp_path / "mine.npz", "--rules", "all", "--neurons", "GNM"]
+    told = league.main(parse(league, [*words, "--epochs", 1, "--out", tmp_path]))
+    assert Path(told["table"]).read_text("utf-8").count("GNM, ALL") == 1
+    assert {"silence", "GNM, ALL"} < {row["name"] for row in json.loads(json.dumps(told))["rows"]}
+
+
+def test_by_without_trials_is_refused() -> None:
+    with pytest.raises(ValueError, match="--by belongs to --trials"):
+        league.main(parse(league, ["--by", "voice"]))
