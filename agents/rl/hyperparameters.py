@@ -29,6 +29,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from agents.rl.memory import LeakyPolicy, LstmPolicy
 from agents.rl.observation import ObservationConfig
+from agents.rl.spiking import GnmPolicy, SpikingPolicy
 from agents.rl.vec_env import PatternVecEnv
 from agents.training.source import DataSource, source_of
 from gnm_env.checks import choice, real, whole
@@ -42,7 +43,7 @@ ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
     algorithm.__name__: algorithm for algorithm in (PPO, RecurrentPPO, DQN)
 }
 OWN_POLICIES: dict[str, type[Any]] = {
-    policy.__name__: policy for policy in (LstmPolicy, LeakyPolicy)
+    policy.__name__: policy for policy in (LstmPolicy, LeakyPolicy, GnmPolicy, SpikingPolicy)
 }
 """Policies that SB3 does not know by name."""
 
@@ -200,6 +201,8 @@ def make_rl_agent(
       its own traces; see `agents.rl.memory` for its start.
     - "leaky-ppo": leaky integrators whose decays are learned in the LSTM's place, below a layer of
       64 units: a state-space model, and the traces of "ppo" inside of the policy.
+    - "gnm-ppo": a GNM that is the whole policy, by its N weights; see `agents.rl.spiking`.
+    - "spiking-ppo": 64 GNMs below a layer of 64 units.
     - "dqn": learns from dense feedback only. Under "cost" the return depends on the number of
       spikes so far, which no trace tells: the values of an observation then are not defined.
 
@@ -276,6 +279,8 @@ def _require_spikes(action_space: gym.Space[Any]) -> None:
 def _begin_near_silence(model: BaseAlgorithm, probability: float) -> None:
     """Last layer × 0.1, its bias by the wanted probability, or by the price of a spike in noise."""
     policy: Any = model.policy
+    if getattr(policy, "starts_near_silence", False):
+        return
     is_q = isinstance(model, DQN)
     last = policy.q_net.q_net[-1] if is_q else policy.action_net
     with torch.no_grad():

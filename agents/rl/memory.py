@@ -42,6 +42,19 @@ class MemoryPolicy(RecurrentActorCriticPolicy):
         outputs, states = lstm(sequence, begin)
         return outputs.swapaxes(0, 1).flatten(0, 1), states
 
+    memory_settings: dict[str, Any]
+    """Arguments of a policy's own, which its file keeps."""
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return {**super()._get_constructor_parameters(), **self.memory_settings}
+
+    def _optimise_anew(self, arguments: tuple[Any, ...], settings: dict[str, Any]) -> None:
+        """A new optimiser, for what the policy now consists of."""
+        schedule = settings["lr_schedule"] if "lr_schedule" in settings else arguments[2]
+        learned = [parameter for parameter in self.parameters() if parameter.requires_grad]
+        optimizer: Any = self.optimizer_class
+        self.optimizer = optimizer(learned, lr=schedule(1), **self.optimizer_kwargs)
+
 
 class LstmPolicy(MemoryPolicy):
     """An LSTM that begins as a row of leaky integrators of random sums of its inputs.
@@ -64,9 +77,6 @@ class LstmPolicy(MemoryPolicy):
         super().__init__(*arguments, **settings)
         self.memory_settings = {"keep": keep, "gain": gain, "recurrent": recurrent}
         _begin_leaky(self.lstm_actor, keep, gain, recurrent)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), **self.memory_settings}
 
 
 OPEN = 2.0
@@ -108,12 +118,7 @@ class LeakyPolicy(MemoryPolicy):
         size = self.lstm_actor.hidden_size
         memory: Any = LeakyIntegrators(self.features_dim, size, keep, gain)
         self.lstm_actor = memory
-        schedule = settings["lr_schedule"] if "lr_schedule" in settings else arguments[2]
-        optimizer: Any = self.optimizer_class
-        self.optimizer = optimizer(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
-
-    def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), **self.memory_settings}
+        self._optimise_anew(arguments, settings)
 
 
 class LeakyIntegrators(nn.Module):

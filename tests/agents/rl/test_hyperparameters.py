@@ -26,6 +26,8 @@ CLASSES = {
     "ppo-linear": PPO,
     "recurrent-ppo": RecurrentPPO,
     "leaky-ppo": RecurrentPPO,
+    "gnm-ppo": RecurrentPPO,
+    "spiking-ppo": RecurrentPPO,
     "dqn": DQN,
 }
 
