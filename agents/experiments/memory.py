@@ -134,6 +134,11 @@ def _counted(classes: int) -> str:
     return "1 class" if classes == 1 else f"{classes} classes"
 
 
+def _by(scores: xr.DataArray, rule: str) -> xr.DataArray:
+    """The scores of one learning rule. (`method` is an argument of xarray's `sel` too.)"""
+    return scores.sel({"method": rule})
+
+
 CLOSE = (0.8, 1.25)
 NEAR = (2 / 3, 3 / 2)
 
@@ -170,11 +175,9 @@ TIMES = 3.0
 
 def _judge_cliff(results: Results) -> Finding:
     scores = score(results["MEMORY"]).sel(classes=1, alpha=0.05)
-    base = by_seed(scores.sel(method="ALL"))
+    base = by_seed(_by(scores, "ALL"))
     found = {
-        name: bootstrap(
-            lambda a, b: float(a.mean() / b.mean()), by_seed(scores.sel(method=name)), base
-        )
+        name: bootstrap(lambda a, b: float(a.mean() / b.mean()), by_seed(_by(scores, name)), base)
         for name in RULES
         if name != "ALL"
     }
@@ -183,7 +186,7 @@ def _judge_cliff(results: Results) -> Finding:
     words = (
         f"α = 0.05, one class: ALL {mean(base):,.0f} bins",
         *(
-            f"{name} {mean(by_seed(scores.sel(method=name))):,.0f} bins, {times:.1f} times ALL"
+            f"{name} {mean(by_seed(_by(scores, name))):,.0f} bins, {times:.1f} times ALL"
             for name, times in found.items()
         ),
     )
@@ -204,7 +207,7 @@ def _correlation(values: NDArray[np.float64], other: NDArray[np.float64]) -> flo
 
 def _judge_optimum(results: Results) -> Finding:
     data = results["MEMORY"]
-    ratio, scores = theory(data), score(data).sel(method="PeakError")
+    ratio, scores = theory(data), _by(score(data), "PeakError")
     held, words = {}, []
     for classes in (c for c in data["classes"].to_numpy() if c > 1):
         told = by_seed(ratio.sel(classes=classes).transpose("pattern_seed", "alpha"))
@@ -226,7 +229,7 @@ def _judge_need(results: Results) -> Finding:
     held, words = {}, []
     for classes in data["classes"].to_numpy():
         scores = by_seed(
-            score(data).sel(classes=classes, method="PeakError").transpose("pattern_seed", "alpha")
+            _by(score(data), "PeakError").sel(classes=classes).transpose("pattern_seed", "alpha")
         )
         share = bootstrap(_memoryless_share, scores)
         held[int(classes)] = share.above(0.8) if classes == 1 else share.below(0.5)
@@ -336,7 +339,7 @@ def _draw_memory(results: Results) -> Figure:
     for column, classes in enumerate(counts):
         top, low = grid[:, column]
         for name, (colour, mark, line) in _STYLES.items():
-            band = _band(scores.sel(classes=classes, method=name))
+            band = _band(_by(scores, name).sel(classes=classes))
             shown = "white" if line == ":" else colour
             top.plot(
                 ALPHA,
