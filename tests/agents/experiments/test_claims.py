@@ -119,6 +119,17 @@ def test_a_network_that_is_better_than_error_traces_is_a_benefit() -> None:
     assert found("F7c", deep).verdict == NOT_REPRODUCED
 
 
+def test_a_benefit_that_is_one_of_the_learning_rate_alone_is_told_from_one_of_the_network() -> None:
+    def fast(setting: Setting) -> float:
+        if setting["neuron"] == "network":
+            return 900.0 if setting.get("learning_rate_hidden") == 1e-4 else 4_000.0
+        return 3_500.0 if setting.get("learning_rate") == 1e-3 else 1_500.0
+
+    finding = found("F7c", fast)
+    assert finding.verdict.startswith(f"{REPRODUCED} if at equal λ it is plain ET from matched")
+    assert "tuned" not in finding.verdict
+
+
 @pytest.mark.parametrize("id_", ["F6a2", "F6b", "F7c"])
 def test_one_seed_has_no_interval_and_is_judged_by_its_value(id_: str) -> None:
     def unlike(setting: Setting) -> float:
@@ -134,6 +145,7 @@ def test_a_network_is_compared_on_the_seeds_that_it_shares_with_error_traces() -
     assert finding is not None
     assert finding.verdict == REPRODUCED
     assert "of 5" in finding.numbers[1]
+    assert "of 5" in finding.numbers[6]
 
     some["BP"] = some["BP"].isel(pattern_seed=slice(5, None))
     finding = BY_ID["F7c"].finding(some)
