@@ -50,8 +50,8 @@ F7_LEARNERS = {
 
 NETWORK: dict[str, Any] = {"neuron": "network", "rule": "bp"}
 USUAL_RATE, TUNED_RATE = 1e-4, 1e-3
-"""λ of ET: the paper's, and the one that does best on pattern seeds 300 to 315, for either form from
-either start. Those of BP are its defaults, as they did well on other seeds, and the paper's."""
+"""λ of ET: the paper's, and the one that does best on pattern seeds 300 to 315, for either form and
+from either start. Those of BP are the paper's, and its defaults, which did well on other seeds."""
 
 NETWORKS = {
     "10 hidden": {**NETWORK, "hidden": 10},
