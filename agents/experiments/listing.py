@@ -28,6 +28,7 @@ SUBJECTS = (
     "constant_input",
     "continuous_time",
     "heat_maps",
+    "residuals",
     "lif_ratio",
     "methods",
     "reactions",

@@ -172,6 +172,19 @@ def test_a_ridge_at_positive_eta_denies_that_eta_zero_is_among_the_best() -> Non
     assert found("F5b", ridge).verdict == NOT_REPRODUCED
 
 
+def test_one_run_of_five_needs_enough_runs_to_be_told_from_two() -> None:
+    def some(every: int) -> Score:
+        def score(setting: Setting) -> float:
+            gains = setting["eta"] > 0 and setting["pattern_seed"] % every == 0
+            return 2_000.0 if gains else 400.0
+
+        return score
+
+    assert found("F5b", some(5), 32).verdict == REPRODUCED  # 7 of 32
+    assert found("F5b", some(5), 5).verdict == NOT_REPRODUCED
+    assert found("F5b", some(3), 32).verdict == NOT_REPRODUCED  # 11 of 32
+
+
 def test_an_optimal_line_for_more_classes_only_is_a_condition() -> None:
     def later(setting: Setting) -> float:
         return flat(setting) if setting["classes"] == 1 else as_in_the_paper(setting)

@@ -8,13 +8,14 @@ import pytest
 import xarray as xr
 
 from agents.experiments.figures import FORMATS, draw
-from agents.experiments.heat_maps import draw_one_class, draw_residuals
+from agents.experiments.heat_maps import draw_one_class
 from agents.experiments.listing import experiments, pictures
+from agents.experiments.residuals import draw_residuals
 from agents.plotting import MAP, save, styled
 from tests.agents.experiments.worlds import as_in_the_paper, world
 
 PICTURES = pictures()
-SCORED = ("F1", "F3", "F3-published", "F4", "F6", "F7", "BP", "table")
+SCORED = ("F1", "F3", "F3-published", "F4", "F5", "F6", "F7", "BP", "table")
 
 
 @pytest.fixture(scope="module")

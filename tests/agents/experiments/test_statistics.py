@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from agents.experiments.heat_maps import Line, best, optimal_line, residuals
+from agents.experiments.heat_maps import Line, best, optimal_line
+from agents.experiments.residuals import residuals
 from agents.experiments.statistics import (
     Interval,
     bootstrap,
