@@ -144,8 +144,7 @@ Evaluate = Callable[[Iterable[Any], int, int, int], NDArray[np.int64]]
 
 
 def evaluator(setting: Setting, most: int) -> Evaluate:
-    """A function of weights (k, N) with k <= `most`, runs, cap and seed: bins survived (k, "
-    "runs)."""
+    """A function of weights (k, N), k <= `most`, runs, cap and seed: bins survived (k, runs)."""
     task = task_of(setting)
     patterns = Patterns.draw(task, setting["pattern_seed"])
     agents = [make_agent({**setting, **ALL}, task) for _ in range(most)]
@@ -184,7 +183,9 @@ def search(
             "bounds": [low, high],
             "CMA_diagonal": True,
             "maxiter": generations,
-            "seed": setting["pattern_seed"] + 1,
+            # Numbers of its own: those of numpy.random are shared by all threads of a process.
+            "randn": np.random.RandomState(setting["pattern_seed"] + 1).randn,
+            "seed": np.nan,
             "verbose": -9,
         },
     )
