@@ -51,7 +51,7 @@ F7_LEARNERS = {
 NETWORK: dict[str, Any] = {"neuron": "network", "rule": "bp"}
 USUAL_RATE, TUNED_RATE = 1e-4, 1e-3
 """λ of ET: the paper's, and the one that does best on pattern seeds 300 to 315, for either form and
-from either start. Those of BP are the paper's, and its defaults, which did well on other seeds."""
+from either start. Those of BP are the paper's, and its defaults."""
 
 NETWORKS = {
     "10 hidden": {**NETWORK, "hidden": 10},
@@ -327,8 +327,8 @@ def _draw_networks(results: Results) -> Figure:
         "1 hidden": "BP\n1 hidden",
         "2 hidden": "BP\n2 hidden",
         "10 hidden": "BP\n10 hidden",
-        "10 hidden, no inhibition": "10, no\ninhibition",
-        "10 hidden, usual λ": f"10, λ\n{USUAL_RATE:g}",
+        "10 hidden, no inhibition": "10 hidden\nno inhibition",
+        "10 hidden, usual λ": f"10 hidden\nλ {USUAL_RATE:g}",
     }
     figure, grid = panels(1, 1, width=WIDE, height=3.0)
     values = {words: (seeds, by_seed(scores.sel(learner=name))) for name, words in names.items()}

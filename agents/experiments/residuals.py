@@ -132,10 +132,10 @@ def draw_runs(results: Results) -> Figure:
         left.plot(etas, row, mark, ls="-", color=colour, ms=2.5, lw=0.7, alpha=0.7)
     left.plot(etas, np.median(rows, axis=0), color=INK, lw=2.0, label="median run")
     left.plot([], [], "^-", color=RED, ms=2.5, lw=0.7, label="some η > 0 clearly ahead")
-    left.plot([], [], "o-", color=GREY, ms=2.5, lw=0.7, label="none")
+    left.plot([], [], "o-", color=GREY, ms=2.5, lw=0.7, label="no η > 0 clearly ahead")
     left.axhline(0, color=INK, lw=0.9, ls="--", zorder=1)
     left.set(xlabel="η (model choice)", ylabel="residual (bins)")
-    left.legend(loc="lower left")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=3)
     letter(left, "a   every run")
     for place, (found, colour) in enumerate(((share(np.arange(5) < 1), GREY), (share(ahead), INK))):
         right.errorbar(
