@@ -33,7 +33,7 @@ from agents.experiments.training import (
     training_seed,
 )
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
+from agents.plotting import BINS, BLUE, INK, RED, WIDE, letter, panels
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
@@ -354,7 +354,7 @@ def _draw(results: Results) -> Figure:
         axes.axhline(Task().silent_score, color="0.5", ls=":", lw=0.8)
         axes.set_xticks(range(len(places)), [f"{n}\n{b}" for n, b in places], fontsize=7)
         letter(axes, f"{name}   {classes} classes")
-    grid[0, 0].set_ylabel("bins survived")
+    grid[0, 0].set_ylabel(BINS)
     figure.legend(
         *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7
     )
