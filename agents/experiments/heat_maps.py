@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
+from agents.experiments.statistics import bootstrap, by_seed, mean, score
 from agents.experiments.training import class_counts, pattern_seeds, training
 from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
 from agents.plotting import (
@@ -146,14 +146,14 @@ def line_means(etas: Weights, alphas: Weights) -> tuple[Weights, Weights]:
     """
     points = np.linspace(LINES, 1.0, _POINTS, axis=1)
     on_line = 1 - LINES[:, None] / points
-    at_alpha = _interpolation(points, alphas)
+    at_alpha = interpolation(points, alphas)
     return (
-        np.einsum("lpe,lpa->lea", _interpolation(on_line, etas), at_alpha) / _POINTS,
-        np.einsum("lpe,lpa->lea", _interpolation(0 * on_line, etas), at_alpha) / _POINTS,
+        np.einsum("lpe,lpa->lea", interpolation(on_line, etas), at_alpha) / _POINTS,
+        np.einsum("lpe,lpa->lea", interpolation(0 * on_line, etas), at_alpha) / _POINTS,
     )
 
 
-def _interpolation(at: Weights, grid: Weights) -> Weights:
+def interpolation(at: Weights, grid: Weights) -> Weights:
     """Weights (…, grid) of linear interpolation between grid values."""
     right = np.clip(np.searchsorted(grid, at), 1, len(grid) - 1)
     share = (at - grid[right - 1]) / (grid[right] - grid[right - 1])
@@ -251,38 +251,6 @@ def _judge_best(results: Results) -> Finding:
     return from_both_starts(judge, "“best” means within 5 % of the best cell")
 
 
-def _line_gain(scores: xr.DataArray) -> tuple[float, Interval]:
-    """α*, and how many bins the best line gains over η = 0 at the same values of α."""
-    weights = line_means(scores["eta"].to_numpy(), scores["alpha"].to_numpy())
-
-    def gain(planes: NDArray[np.float64]) -> float:
-        line = best_line(*weights, planes.mean(axis=0))
-        return line.score - line.uncorrected
-
-    found = bootstrap(gain, by_seed(scores.transpose("pattern_seed", "eta", "alpha")))
-    return optimal_line(_average(scores)).alpha, found
-
-
-def _judge_line(results: Results) -> Finding:
-    """F3d: the optimal line."""
-    four = score(results["F4"]).sel(readout="V")
-    maps = {
-        "one class, matched initial weights": _one_class(results, "matched"),
-        "one class, published initial weights": _one_class(results, "published"),
-        "two classes, matched initial weights": four.sel(classes=2),
-        "three classes, matched initial weights": four.sel(classes=3),
-    }
-    found = {name: _line_gain(scores) for name, scores in maps.items()}
-    held = {name: gain.above(0.0) for name, (_, gain) in found.items()}
-    words = [
-        f"{name}: α* = {alpha:.3f}, gain along the line {gain:+,.0f} bins"
-        for name, (alpha, gain) in found.items()
-    ]
-    one = all(holds for name, holds in held.items() if name.startswith("one class"))
-    conditions = {f"the task has {name}": holds for name, holds in held.items()}
-    return Finding(one, conditions, tuple(words))
-
-
 def _judge_mst(results: Results) -> Finding:
     """F3e: the MST's mark."""
     table = results["table"].sel(classes=1)
@@ -373,19 +341,6 @@ CLAIMS = (
         ("F3", "F3-published"),
         _ONE,
         _judge_best,
-    ),
-    Claim(
-        "F3d",
-        "Fig. 3b",
-        "An optimal line (1−η)α = α*",
-        _MAP_PROTOCOL + "; two and three classes as well",
-        "reproduced if, for one class and from both starts, the mean from α = α* to 1 along the "
-        "best line (1−η)α = α* exceeds that at η = 0 for the same α, with an interval above 0 "
-        "(bootstrap over seeds; α* is the best of 0.05 … 0.5, estimated anew each time); "
-        "conditional on the number of classes and the start",
-        ("F3", "F3-published", "F4"),
-        "gnm/PatternStream-v0, 1 to 3 classes",
-        _judge_line,
     ),
     Claim(
         "F3e",
