@@ -107,11 +107,10 @@ class Cell(NamedTuple):
 
 
 class Line(NamedTuple):
-    """The best line (1−η)α = α*, the mean score along it, and that at η = 0 for the same α."""
+    """The best line (1−η)α = α*, and the mean score along it."""
 
     alpha: float
     score: float
-    uncorrected: float
 
     @property
     def at_edge(self) -> bool:
@@ -128,29 +127,13 @@ def best(scores: xr.DataArray) -> Cell:
 def optimal_line(scores: xr.DataArray) -> Line:
     """The line (1−η)α = α* with the highest mean score from α = α* to α = 1."""
     plane = scores.transpose("eta", "alpha")
-    along, uncorrected = line_means(plane["eta"].to_numpy(), plane["alpha"].to_numpy())
-    return best_line(along, uncorrected, plane.to_numpy())
-
-
-def best_line(along: Weights, uncorrected: Weights, plane: Weights) -> Line:
-    """The same from the weights that `line_means` gives, for scores (η, α) as an array."""
-    means = np.tensordot(along, plane, 2)
-    place = int(means.argmax())
-    return Line(float(LINES[place]), float(means[place]), float((uncorrected[place] * plane).sum()))
-
-
-def line_means(etas: Weights, alphas: Weights) -> tuple[Weights, Weights]:
-    """Weights (lines, η, α) with which a map's cells make the mean along each line, and at η = 0.
-
-    Scores between cells are interpolated linearly, so that a mean along a line is a sum over cells.
-    """
+    # Scores between cells are interpolated, so that a mean along a line is a sum over cells.
     points = np.linspace(LINES, 1.0, _POINTS, axis=1)
-    on_line = 1 - LINES[:, None] / points
-    at_alpha = interpolation(points, alphas)
-    return (
-        np.einsum("lpe,lpa->lea", interpolation(on_line, etas), at_alpha) / _POINTS,
-        np.einsum("lpe,lpa->lea", interpolation(0 * on_line, etas), at_alpha) / _POINTS,
-    )
+    on_line = interpolation(1 - LINES[:, None] / points, plane["eta"].to_numpy())
+    at_alpha = interpolation(points, plane["alpha"].to_numpy())
+    means = np.einsum("lpe,lpa,ea->l", on_line, at_alpha, plane.to_numpy()) / _POINTS
+    place = int(means.argmax())
+    return Line(float(LINES[place]), float(means[place]))
 
 
 def interpolation(at: Weights, grid: Weights) -> Weights:

@@ -169,7 +169,7 @@ PICTURES = {
         _draw,
         ("LINES",),
         "Mean score along the best line (1−η)α = α* (α = 0.5 … 1), less that along the best line "
-        "of each other family, as a share of the former, with 95 % bootstrap intervals over pattern "
-        "seeds. Right of the dashed line the paper's line is the better one.",
+        "of each other family, as a share of the former, with 95 % bootstrap intervals over "
+        "pattern seeds. Right of the dashed line the paper's line is the better one.",
     )
 }
