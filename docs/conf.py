@@ -31,7 +31,14 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "extensions", "league", "reproduction/*/stores", "tutorials/scripts"]
+exclude_patterns = [
+    "_build",
+    "extensions",
+    "league",
+    "reproduction/*/stores",
+    "findings/*/stores",
+    "tutorials/scripts",
+]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
 # "cost" in the text is a string of Python: its quotes stay as they are.

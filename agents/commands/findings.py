@@ -1,7 +1,7 @@
 """Ask what the paper's method could not: run the experiments, draw them, judge the hypotheses.
 
     gnm findings                 minutes: few seeds
-    gnm findings --size paper    about two hours on one core
+    gnm findings --size paper    about half an hour on one core
 
 Each hypothesis and its rule were written down before the run. May be stopped at any moment: what is
 finished is kept, and the next start goes on from there.
@@ -13,12 +13,14 @@ import argparse
 import json
 from typing import Any
 
-from agents.commands.sweep import described, workers
+from agents.commands.sweep import workers
 from agents.commands.terminal import RESULTS, Parser, share, share_run
 from agents.experiments.figures import draw, load
 from agents.experiments.listing import BEYOND, experiment, experiments, hypotheses, pictures
 from agents.experiments.progress import duration
 from agents.experiments.provenance import commit, software
+from agents.experiments.report import minus, seeds_behind, stores
+from agents.experiments.store import summarise
 from agents.experiments.sweep import sweep
 from agents.experiments.verdict import Hypothesis, Results
 
@@ -45,21 +47,20 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     if unknown:
         raise ValueError(f"there is no experiment {unknown[0]!r}: choose from {', '.join(known)}")
     folder = options.results or RESULTS / options.size
-    costs = {}
     if not options.judge:
         with workers(options) as executor:
             for one in (experiment(name, options.size) for name in names):
                 summary = sweep(one, folder / one.name, executor, repair=options.repair)
-                costs[one.name] = described(summary)
                 print(f"{one.name}: {one.cells:,} cells, {duration(summary.wall)}", flush=True)
     results, absent = load(folder, names)
     if not results:
         raise ValueError(f"there is nothing to judge in {folder}: {'; '.join(absent)}")
     told = [row(one, results, options.size) for one in hypotheses()]
-    draw(pictures(BEYOND), results, options.out / "figures")
+    drawn = draw(pictures(BEYOND), results, options.out / "figures")
     record = {
-        "size": options.size, "software": software(), "commit": commit(),
-        "findings": told, "experiments": costs,
+        "size": options.size, "software": software(), "commit": commit(), "findings": told,
+        "figures": {name: pictures(BEYOND)[name].full_caption(results) for name in drawn},
+        "stores": stores({name: summarise(folder / name) for name in results}),
     }  # fmt: skip
     options.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(record, indent=1, ensure_ascii=False)
@@ -78,8 +79,9 @@ def row(one: Hypothesis, results: Results, size: str) -> dict[str, Any]:
         "words": one.words,
         "because": one.because,
         "protocol": one.protocol,
+        "seeds": seeds_behind(one, results),
         "rule": one.rule,
         "verdict": one.verdict(results),
-        "numbers": finding.numbers if finding else (),
+        "numbers": tuple(map(minus, finding.numbers)) if finding else (),
         "command": " && ".join(f"gnm sweep {name} --size {size}" for name in one.needs),
     }

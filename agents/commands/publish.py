@@ -2,6 +2,7 @@
 
     gnm publish --size paper
     gnm publish --size quick --stores
+    gnm publish --findings --size paper    what gnm findings found, in docs/findings
 
 Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, and with
 --stores one zip per experiment. Unpacked into results/SIZE/NAME, it is the store that it was.
@@ -13,41 +14,61 @@ import argparse
 import json
 import shutil
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from agents.commands.findings import FINDINGS
 from agents.commands.terminal import REPORT, RESULTS, Parser, share
 from agents.experiments.store import read
 
-DOCS = Path("docs") / "reproduction"
 KEPT = ("png", "pdf")
+
+
+class Kind(NamedTuple):
+    """What may be kept: the name of its file, the command that writes it, and both folders."""
+
+    name: str
+    verb: str
+    report: Path
+    docs: Path
+
+
+CLAIMS = Kind("claims", "reproduce", REPORT, Path("docs") / "reproduction")
+FOUND = Kind("findings", "findings", FINDINGS, Path("docs") / "findings")
 
 
 def options(parser: Parser) -> None:
     share(parser, "--size")
+    parser.add_argument(
+        "--findings", action="store_true", help="keep the findings beyond the paper, not its claims"
+    )
     parser.add_argument("--stores", action="store_true", help="keep the stores too")
     share(parser, "--results")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default {REPORT})")
-    share(parser, "--out", default=DOCS)
+    parser.add_argument(
+        "--report", type=Path, metavar="FOLDER", help=f"(default {REPORT}, or {FINDINGS})"
+    )
+    share(parser, "--out", help=f"(default {CLAIMS.docs}, or {FOUND.docs})")
 
 
 def main(options: argparse.Namespace) -> dict[str, Any]:
     """Replace what is kept of one size."""
-    found = claims(options.report, options.size)
+    kind = FOUND if options.findings else CLAIMS
+    report = options.report or kind.report
+    found = told(kind, report, options.size)
     results = options.results or RESULTS / options.size
-    target = options.out / options.size
+    target = (options.out or kind.docs) / options.size
     stores = [store["name"] for store in found["stores"]] if options.stores else []
     with replaced(target) as fresh:
         (fresh / "figures").mkdir()
         for suffix in KEPT:
-            for picture in sorted((options.report / "figures").glob(f"*.{suffix}")):
+            for picture in sorted((report / "figures").glob(f"*.{suffix}")):
                 shutil.copy(picture, fresh / "figures")
-        shutil.copy(options.report / "claims.json", fresh)
-        (fresh / "claims.md").write_text(page(found), encoding="utf-8")
+        shutil.copy(report / f"{kind.name}.json", fresh)
+        (fresh / f"{kind.name}.md").write_text(page(kind, found), encoding="utf-8")
         packed = [pack(results / name, fresh / "stores").relative_to(fresh) for name in stores]
-    print(f"{len(found['claims'])} claims and {len(packed)} stores in {target}")
+    print(f"{len(found[kind.name])} {kind.name} and {len(packed)} stores in {target}")
     return {"folder": str(target), "stores": [str(target / path) for path in packed]}
 
 
@@ -69,35 +90,38 @@ def replaced(folder: Path) -> Iterator[Path]:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def claims(report: Path, size: str) -> dict[str, Any]:
-    """What claims.json of a report says; ValueError if there is none, or of another size."""
+def told(kind: Kind, report: Path, size: str) -> dict[str, Any]:
+    """What the JSON file of a report says; ValueError if there is none, or of another size."""
     try:
-        found: dict[str, Any] = json.loads((report / "claims.json").read_text("utf-8"))
+        found: dict[str, Any] = json.loads((report / f"{kind.name}.json").read_text("utf-8"))
     except FileNotFoundError:
-        raise ValueError(f"there is no report in {report}; run gnm reproduce first") from None
+        raise ValueError(f"there is no report in {report}; run gnm {kind.verb} first") from None
     if found["size"] != size:
+        again = "report" if kind is CLAIMS else "findings --judge"
         raise ValueError(
             f"{report} is a report of size {found['size']!r}, not {size!r}; "
-            f"run gnm report --size {size} first"
+            f"run gnm {again} --size {size} first"
         )
     return found
 
 
-def page(found: dict[str, Any]) -> str:
-    """The claims as Markdown: what was found, the verdicts, and what it took."""
+def page(kind: Kind, found: dict[str, Any]) -> str:
+    """The claims or findings as Markdown: what was found, the verdicts, and what it took."""
+    about = "../../reproduction.md" if kind is CLAIMS else "../../findings.md"
     lines = [
-        f"# The claims at {found['size']} size",
+        f"# The {kind.name} at {found['size']} size",
         "",
-        "Written by `gnm publish`. The rules of the verdicts stand in claims.json",
-        "and beside the experiments; how it is all made: [reproduction.md](../../reproduction.md).",
+        f"Written by `gnm publish`. The rules of the verdicts stand in {kind.name}.json",
+        f"and beside the experiments; how it is all made: [{Path(about).name}]({about}).",
         "",
-        "| claim | in short | found | verdict |",
+        f"| {'claim' if kind is CLAIMS else 'expected'} | in short | found | verdict |",
         "|---|---|---|---|",
         *(
             _row(row["id"], row["words"], "<br>".join(row["numbers"]), f"**{row['verdict']}**")
-            for row in found["claims"]
+            for row in found[kind.name]
         ),
         "",
+        *_pictures(found.get("figures", {})),
         "| experiment | blocks | time | work of all threads | version |",
         "|---|---|---|---|---|",
         *(
@@ -106,6 +130,15 @@ def page(found: dict[str, Any]) -> str:
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _pictures(captions: Mapping[str, str]) -> list[str]:
+    """Every figure with its caption below."""
+    return [
+        line
+        for name, caption in captions.items()
+        for line in (f"![{name}](figures/{name}.png)", "", f"*{name}: {caption}*", "")
+    ]
 
 
 def _row(*cells: Any) -> str:

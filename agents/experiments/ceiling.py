@@ -33,7 +33,7 @@ from agents.experiments.training import (
     training_seed,
 )
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
+from agents.plotting import BINS, BLUE, INK, RED, WIDE, letter, panels
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
@@ -144,8 +144,7 @@ Evaluate = Callable[[Iterable[Any], int, int, int], NDArray[np.int64]]
 
 
 def evaluator(setting: Setting, most: int) -> Evaluate:
-    """A function of weights (k, N) with k <= `most`, runs, cap and seed: bins survived (k, "
-    "runs)."""
+    """A function of weights (k, N), k <= `most`, runs, cap and seed: bins survived (k, runs)."""
     task = task_of(setting)
     patterns = Patterns.draw(task, setting["pattern_seed"])
     agents = [make_agent({**setting, **ALL}, task) for _ in range(most)]
@@ -184,7 +183,9 @@ def search(
             "bounds": [low, high],
             "CMA_diagonal": True,
             "maxiter": generations,
-            "seed": setting["pattern_seed"] + 1,
+            # Numbers of its own: those of numpy.random are shared by all threads of a process.
+            "randn": np.random.RandomState(setting["pattern_seed"] + 1).randn,
+            "seed": np.nan,
             "verbose": -9,
         },
     )
@@ -353,7 +354,7 @@ def _draw(results: Results) -> Figure:
         axes.axhline(Task().silent_score, color="0.5", ls=":", lw=0.8)
         axes.set_xticks(range(len(places)), [f"{n}\n{b}" for n, b in places], fontsize=7)
         letter(axes, f"{name}   {classes} classes")
-    grid[0, 0].set_ylabel("bins survived")
+    grid[0, 0].set_ylabel(BINS)
     figure.legend(
         *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7
     )

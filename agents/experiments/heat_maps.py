@@ -7,7 +7,6 @@ is narrow rather than wide: the rules therefore compare it with generous bounds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
+from agents.experiments.statistics import bootstrap, by_seed, mean, score
 from agents.experiments.training import class_counts, pattern_seeds, training
 from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
 from agents.plotting import (
@@ -23,7 +22,6 @@ from agents.plotting import (
     BLUE,
     INK,
     MAP,
-    METHOD_COLOURS,
     RED,
     WIDE,
     letter,
@@ -88,9 +86,6 @@ def more_classes(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 
 # --- what is read off a map ----------------------------------------------------------------------
 
-LARGEST_ETA = 0.6
-"""Residuals are looked at up to this η, as in the paper."""
-
 LINES = np.arange(0.05, 0.501, 0.005)
 """Candidates for α*, 0.05 … 0.5; each line runs from (η = 0, α = α*) to α = 1.
 
@@ -112,11 +107,10 @@ class Cell(NamedTuple):
 
 
 class Line(NamedTuple):
-    """The best line (1−η)α = α*, the mean score along it, and that at η = 0 for the same α."""
+    """The best line (1−η)α = α*, and the mean score along it."""
 
     alpha: float
     score: float
-    uncorrected: float
 
     @property
     def at_edge(self) -> bool:
@@ -133,32 +127,16 @@ def best(scores: xr.DataArray) -> Cell:
 def optimal_line(scores: xr.DataArray) -> Line:
     """The line (1−η)α = α* with the highest mean score from α = α* to α = 1."""
     plane = scores.transpose("eta", "alpha")
-    along, uncorrected = line_means(plane["eta"].to_numpy(), plane["alpha"].to_numpy())
-    return best_line(along, uncorrected, plane.to_numpy())
-
-
-def best_line(along: Weights, uncorrected: Weights, plane: Weights) -> Line:
-    """The same from the weights that `line_means` gives, for scores (η, α) as an array."""
-    means = np.tensordot(along, plane, 2)
-    place = int(means.argmax())
-    return Line(float(LINES[place]), float(means[place]), float((uncorrected[place] * plane).sum()))
-
-
-def line_means(etas: Weights, alphas: Weights) -> tuple[Weights, Weights]:
-    """Weights (lines, η, α) with which a map's cells make the mean along each line, and at η = 0.
-
-    Scores between cells are interpolated linearly, so that a mean along a line is a sum over cells.
-    """
+    # Scores between cells are interpolated, so that a mean along a line is a sum over cells.
     points = np.linspace(LINES, 1.0, _POINTS, axis=1)
-    on_line = 1 - LINES[:, None] / points
-    at_alpha = _interpolation(points, alphas)
-    return (
-        np.einsum("lpe,lpa->lea", _interpolation(on_line, etas), at_alpha) / _POINTS,
-        np.einsum("lpe,lpa->lea", _interpolation(0 * on_line, etas), at_alpha) / _POINTS,
-    )
+    on_line = interpolation(1 - LINES[:, None] / points, plane["eta"].to_numpy())
+    at_alpha = interpolation(points, plane["alpha"].to_numpy())
+    means = np.einsum("lpe,lpa,ea->l", on_line, at_alpha, plane.to_numpy()) / _POINTS
+    place = int(means.argmax())
+    return Line(float(LINES[place]), float(means[place]))
 
 
-def _interpolation(at: Weights, grid: Weights) -> Weights:
+def interpolation(at: Weights, grid: Weights) -> Weights:
     """Weights (…, grid) of linear interpolation between grid values."""
     right = np.clip(np.searchsorted(grid, at), 1, len(grid) - 1)
     share = (at - grid[right - 1]) / (grid[right] - grid[right - 1])
@@ -166,21 +144,6 @@ def _interpolation(at: Weights, grid: Weights) -> Weights:
     np.put_along_axis(weights, right[..., None], share[..., None], -1)
     np.put_along_axis(weights, right[..., None] - 1, 1 - share[..., None], -1)
     return weights
-
-
-def residuals(results: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Best over α at each 0 < η <= `LARGEST_ETA` minus best over α at η = 0, with standard errors.
-
-    The errors, in bins, are those of a difference of two means over the evaluation runs.
-    """
-    scores = score(results)
-    error = results["survived"].std("run", ddof=1) / np.sqrt(results.sizes["run"])
-    top = scores.max("alpha")
-    top_error = error.isel(alpha=scores.argmax("alpha")).drop_vars("alpha")
-    residual = top - top.sel(eta=0.0)
-    spread = np.hypot(top_error, top_error.sel(eta=0.0))
-    apart = {"eta": (scores["eta"] > 0) & (scores["eta"] <= LARGEST_ETA + 1e-9)}
-    return residual.isel(apart), spread.isel(apart)
 
 
 # --- the claims ----------------------------------------------------------------------------------
@@ -271,38 +234,6 @@ def _judge_best(results: Results) -> Finding:
     return from_both_starts(judge, "“best” means within 5 % of the best cell")
 
 
-def _line_gain(scores: xr.DataArray) -> tuple[float, Interval]:
-    """α*, and how many bins the best line gains over η = 0 at the same values of α."""
-    weights = line_means(scores["eta"].to_numpy(), scores["alpha"].to_numpy())
-
-    def gain(planes: NDArray[np.float64]) -> float:
-        line = best_line(*weights, planes.mean(axis=0))
-        return line.score - line.uncorrected
-
-    found = bootstrap(gain, by_seed(scores.transpose("pattern_seed", "eta", "alpha")))
-    return optimal_line(_average(scores)).alpha, found
-
-
-def _judge_line(results: Results) -> Finding:
-    """F3d: the optimal line."""
-    four = score(results["F4"]).sel(readout="V")
-    maps = {
-        "one class, matched initial weights": _one_class(results, "matched"),
-        "one class, published initial weights": _one_class(results, "published"),
-        "two classes, matched initial weights": four.sel(classes=2),
-        "three classes, matched initial weights": four.sel(classes=3),
-    }
-    found = {name: _line_gain(scores) for name, scores in maps.items()}
-    held = {name: gain.above(0.0) for name, (_, gain) in found.items()}
-    words = [
-        f"{name}: α* = {alpha:.3f}, gain along the line {gain:+,.0f} bins"
-        for name, (alpha, gain) in found.items()
-    ]
-    one = all(holds for name, holds in held.items() if name.startswith("one class"))
-    conditions = {f"the task has {name}": holds for name, holds in held.items()}
-    return Finding(one, conditions, tuple(words))
-
-
 def _judge_mst(results: Results) -> Finding:
     """F3e: the MST's mark."""
     table = results["table"].sel(classes=1)
@@ -357,31 +288,6 @@ def _judge_eta_zero(results: Results) -> Finding:
     )
 
 
-AHEAD_SIGMAS = 3.0
-
-
-def _judge_residuals(results: Results) -> Finding:
-    """F5b: gains of η > 0, run by run."""
-    three = results["F4"].sel(readout="V", classes=3)
-    residual, error = residuals(three)
-    clearly = (residual > AHEAD_SIGMAS * error).any("eta")
-    on_average = residual.median("eta") > 0
-    runs = int(residual.sizes["pattern_seed"])
-    under = float((residual < 0).mean())
-    numbers = (
-        f"{int(clearly.sum())} of {runs} runs have an η > 0 that is ahead by more than "
-        f"{AHEAD_SIGMAS:g} standard errors",
-        f"in {int(on_average.sum())} the median residual over η is positive",
-        f"{under:.0%} of all points lie below 0",
-    )
-    limit = 0.2 * runs
-    return Finding(
-        int(clearly.sum()) <= limit,
-        {"“ahead” means ahead at the median η": int(on_average.sum()) <= limit},
-        numbers,
-    )
-
-
 CLAIMS = (
     Claim(
         "F3a",
@@ -420,19 +326,6 @@ CLAIMS = (
         _judge_best,
     ),
     Claim(
-        "F3d",
-        "Fig. 3b",
-        "An optimal line (1−η)α = α*",
-        _MAP_PROTOCOL + "; two and three classes as well",
-        "reproduced if, for one class and from both starts, the mean from α = α* to 1 along the "
-        "best line (1−η)α = α* exceeds that at η = 0 for the same α, with an interval above 0 "
-        "(bootstrap over seeds; α* is the best of 0.05 … 0.5, estimated anew each time); "
-        "conditional on the number of classes and the start",
-        ("F3", "F3-published", "F4"),
-        "gnm/PatternStream-v0, 1 to 3 classes",
-        _judge_line,
-    ),
-    Claim(
         "F3e",
         "Fig. 3, caption",
         f"The MST averages ≈ {MST_PAPER:.0f} on one class",
@@ -468,25 +361,11 @@ CLAIMS = (
         _MORE,
         _judge_eta_zero,
     ),
-    Claim(
-        "F5b",
-        "Fig. 5b",
-        "Three classes, best over α at each η against the best at η = 0: in only 1 run of 5 some η "
-        "> 0 is ahead",
-        "the data of F4, three classes, readout V, 0 < η ≤ 0.6",
-        f"reproduced if in at most 1 run of 5 any η is ahead by more than {AHEAD_SIGMAS:g} "
-        "standard errors (of the two means over streams); conditional if that holds for the median "
-        "over η",
-        ("F4",),
-        "gnm/PatternStream-v0, 3 classes",
-        _judge_residuals,
-    ),
 )
 
 # --- the figures ---------------------------------------------------------------------------------
 
-_MARKS = ("o", "s", "^", "D", "v")
-_CLASS_NAMES = {1: "one class", 2: "two classes", 3: "three classes", 4: "four classes"}
+CLASS_NAMES = {1: "one class", 2: "two classes", 3: "three classes", 4: "four classes"}
 
 
 def draw_one_class(results: Results, start: str) -> Figure:
@@ -523,14 +402,14 @@ def _draw_more_classes(results: Results) -> Figure:
             line = optimal_line(scores) if readout == "V" else None
             heat_map(axes, scores, mst, line, gap=0.09)
             name = "abcdef"[3 * row + column]
-            letter(axes, f"{name}   {_CLASS_NAMES[int(classes)]}, {readout}")
+            letter(axes, f"{name}   {CLASS_NAMES[int(classes)]}, {readout}")
     return figure
 
 
 def _edge_note(maps: xr.Dataset) -> str:
     """For a caption: which α* lie at an end of the range in which they were sought, if any do."""
     lines = {int(c): optimal_line(_average(score(maps.sel(classes=c)))) for c in maps["classes"]}
-    ends = [f"{line.alpha:g} ({_CLASS_NAMES[c]})" for c, line in lines.items() if line.at_edge]
+    ends = [f"{line.alpha:g} ({CLASS_NAMES[c]})" for c, line in lines.items() if line.at_edge]
     if not ends:
         return ""
     return (
@@ -600,51 +479,12 @@ def _draw_against_alpha(results: Results) -> Figure:
     figure, grid = panels(1, 3, width=WIDE, height=2.4)
     for axes, classes, name in zip(grid[0], maps["classes"].to_numpy(), "abc", strict=True):
         curves(axes, _average(score(maps.sel(classes=classes))))
-        letter(axes, f"{name}   {_CLASS_NAMES[int(classes)]}")
+        letter(axes, f"{name}   {CLASS_NAMES[int(classes)]}")
         axes.get_legend().remove()
     grid[0, 0].legend(loc="upper left", fontsize=6)
     for axes in grid[0, 1:]:
         axes.set_ylabel("")
     return figure
-
-
-def draw_residuals(results: Results) -> Figure:
-    """Best over α at each η minus the best at η = 0, run by run, for one to four classes."""
-    figure, grid = panels(2, 2, width=WIDE, height=4.6, sharex=True)
-    maps: Mapping[int, xr.Dataset] = {1: results["F3"].sel(classes=1)} | {
-        c: results["F4"].sel(readout="V", classes=c) for c in (2, 3, 4)
-    }
-    for axes, (classes, data), name in zip(grid.flat, maps.items(), "abcd", strict=True):
-        _residuals(axes, data)
-        letter(axes, f"{name}   {_CLASS_NAMES[classes]}")
-    for axes in grid[1]:
-        axes.set_xlabel("η (model choice)")
-    for axes in grid[:, 0]:
-        axes.set_ylabel("residual (bins)")
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(),
-        loc="outside lower center", ncols=5, title="pattern seed", title_fontsize=7,
-    )  # fmt: skip
-    return figure
-
-
-def _residuals(axes: Axes, data: xr.Dataset) -> None:
-    residual, error = residuals(data)
-    seeds = residual["pattern_seed"].to_numpy()
-    etas = residual["eta"].to_numpy()
-    # So that runs do not hide each other; more than five share the room of five.
-    places = max(len(seeds), 5)
-    apart, middle = 0.6 / places * np.diff(etas).min(), (places - 1) / 2
-    for place, seed in enumerate(seeds):
-        run, turn = {"pattern_seed": seed}, place // len(_MARKS)
-        mark = _MARKS[place % len(_MARKS)]
-        colour = METHOD_COLOURS[(place + turn) % len(METHOD_COLOURS)]
-        axes.errorbar(
-            etas + (place - middle) * apart, residual.sel(run), error.sel(run),
-            fmt=mark, ms=3.2, lw=0.6, color=colour, mfc="white" if mark in "sD" else colour,
-            mew=0.8, label=str(seed),
-        )  # fmt: skip
-    axes.axhline(0, color=INK, lw=0.9, ls="--", zorder=1)
 
 
 def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -683,12 +523,5 @@ PICTURES = {
         _draw_against_alpha,
         ("F4",),
         "Noisy performance against α for two, three and four classes, readout V. Red is η = 0.",
-    ),
-    "F5b": Picture(
-        draw_residuals,
-        ("F3", "F4"),
-        "For each η the best score over α, minus the best score at η = 0, for each pattern seed. "
-        "Points above the dashed line have gained from η > 0; bars are standard errors over the "
-        "evaluation streams.",
     ),
 }

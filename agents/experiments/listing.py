@@ -28,6 +28,8 @@ SUBJECTS = (
     "constant_input",
     "continuous_time",
     "heat_maps",
+    "lines",
+    "residuals",
     "lif_ratio",
     "methods",
     "reactions",
@@ -57,7 +59,8 @@ def experiments(names: Sequence[str] = SUBJECTS) -> dict[str, Builder]:
 
 def claims() -> tuple[Claim, ...]:
     """Every claim of the paper that is judged, in the paper's order."""
-    return tuple(claim for one in subjects() for claim in getattr(one, "CLAIMS", ()))
+    found = (claim for one in subjects() for claim in getattr(one, "CLAIMS", ()))
+    return tuple(sorted(found, key=lambda claim: claim.id))
 
 
 def hypotheses() -> tuple[Hypothesis, ...]:

@@ -24,7 +24,7 @@ from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, sc
 from agents.experiments.training import PUBLISHED_START, class_counts, pattern_seeds, training
 from agents.experiments.verdict import Finding, Hypothesis, Results
 from agents.neurons.gnm import GNM
-from agents.plotting import BLUE, INK, RED, WIDE, letter, panels, silent_line
+from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, letter, panels, silent_line
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
@@ -134,6 +134,11 @@ def _counted(classes: int) -> str:
     return "1 class" if classes == 1 else f"{classes} classes"
 
 
+def _by(scores: xr.DataArray, rule: str) -> xr.DataArray:
+    """The scores of one learning rule. (`method` is an argument of xarray's `sel` too.)"""
+    return scores.sel({"method": rule})
+
+
 CLOSE = (0.8, 1.25)
 NEAR = (2 / 3, 3 / 2)
 
@@ -170,11 +175,9 @@ TIMES = 3.0
 
 def _judge_cliff(results: Results) -> Finding:
     scores = score(results["MEMORY"]).sel(classes=1, alpha=0.05)
-    base = by_seed(scores.sel(method="ALL"))
+    base = by_seed(_by(scores, "ALL"))
     found = {
-        name: bootstrap(
-            lambda a, b: float(a.mean() / b.mean()), by_seed(scores.sel(method=name)), base
-        )
+        name: bootstrap(lambda a, b: float(a.mean() / b.mean()), by_seed(_by(scores, name)), base)
         for name in RULES
         if name != "ALL"
     }
@@ -183,7 +186,7 @@ def _judge_cliff(results: Results) -> Finding:
     words = (
         f"α = 0.05, one class: ALL {mean(base):,.0f} bins",
         *(
-            f"{name} {mean(by_seed(scores.sel(method=name))):,.0f} bins, {times:.1f} times ALL"
+            f"{name} {mean(by_seed(_by(scores, name))):,.0f} bins, {times:.1f} times ALL"
             for name, times in found.items()
         ),
     )
@@ -204,7 +207,7 @@ def _correlation(values: NDArray[np.float64], other: NDArray[np.float64]) -> flo
 
 def _judge_optimum(results: Results) -> Finding:
     data = results["MEMORY"]
-    ratio, scores = theory(data), score(data).sel(method="PeakError")
+    ratio, scores = theory(data), _by(score(data), "PeakError")
     held, words = {}, []
     for classes in (c for c in data["classes"].to_numpy() if c > 1):
         told = by_seed(ratio.sel(classes=classes).transpose("pattern_seed", "alpha"))
@@ -226,7 +229,7 @@ def _judge_need(results: Results) -> Finding:
     held, words = {}, []
     for classes in data["classes"].to_numpy():
         scores = by_seed(
-            score(data).sel(classes=classes, method="PeakError").transpose("pattern_seed", "alpha")
+            _by(score(data), "PeakError").sel(classes=classes).transpose("pattern_seed", "alpha")
         )
         share = bootstrap(_memoryless_share, scores)
         held[int(classes)] = share.above(0.8) if classes == 1 else share.below(0.5)
@@ -336,7 +339,7 @@ def _draw_memory(results: Results) -> Figure:
     for column, classes in enumerate(counts):
         top, low = grid[:, column]
         for name, (colour, mark, line) in _STYLES.items():
-            band = _band(scores.sel(classes=classes, method=name))
+            band = _band(_by(scores, name).sel(classes=classes))
             shown = "white" if line == ":" else colour
             top.plot(
                 ALPHA,
@@ -350,8 +353,12 @@ def _draw_memory(results: Results) -> Figure:
                 label=name,
             )
             top.fill_between(ALPHA, band[:, 1], band[:, 2], color=colour, alpha=0.13, lw=0)
-        silent_line(top, Task().silent_score)
+        if column == len(counts) - 1:
+            silent_line(top, Task().silent_score)
+        else:  # the line alone: its name would stand in the next panel
+            top.axhline(Task().silent_score, color=GREY, lw=0.8, ls=":", zorder=1)
         top.set_ylim(0, 10_300)
+        top.tick_params(labelleft=column == 0)
         ratios = _band(told.sel(classes=classes))
         low.fill_between(ALPHA, ratios[:, 1], ratios[:, 2], color=BLUE, alpha=0.2, lw=0)
         low.plot(ALPHA, ratios[:, 0], color=BLUE, lw=1.3)
@@ -361,8 +368,8 @@ def _draw_memory(results: Results) -> Figure:
         low.set_ylim(bottom=0)
         _log_alpha(low)
         letter(top, f"{'abcd'[column]}   {_counted(classes)}")
-    grid[0, 0].set_ylabel("bins survived")
-    grid[1, 0].set_ylabel("signal / noise")
+    grid[0, 0].set_ylabel(BINS)
+    grid[1, 0].set_ylabel("signal / noise (SD)")
     figure.supxlabel("α (decay per bin)", fontsize=8)
     figure.legend(
         *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=7
@@ -372,7 +379,7 @@ def _draw_memory(results: Results) -> Figure:
 
 def _log_alpha(axes: Axes) -> None:
     axes.set_xscale("log")
-    axes.set_xticks((0.02, 0.05, 0.1, 0.2, 0.5, 1.0), ("0.02", "0.05", "0.1", "0.2", "0.5", "1"))
+    axes.set_xticks((0.02, 0.1, 0.3, 1.0), ("0.02", "0.1", "0.3", "1"))
     axes.minorticks_off()
 
 
@@ -387,9 +394,9 @@ def _draw_trap(results: Results) -> Figure:
             predicted = predicted_traps(data, int(classes), start)
             measured = measured_traps(data, int(classes), start)
             axes.plot(predicted[:, 0], measured, mark, color=colour, ms=3.5, mew=0, alpha=0.6,
-                      label=f"{start} initial weights")  # fmt: skip
+                      label=f"{start} initial weights, crossings")  # fmt: skip
             axes.plot(predicted[:, 1], measured, mark, color=colour, ms=3.5, mfc="none", mew=0.6,
-                      alpha=0.6, label="the same, from μ = ϑ alone")  # fmt: skip
+                      alpha=0.6, label=f"{start} initial weights, μ = ϑ alone")  # fmt: skip
         axes.plot(ends, ends, color=INK, lw=0.9, ls="--", zorder=1)
         axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="predicted α")
         for axis in (axes.xaxis, axes.yaxis):

@@ -20,7 +20,14 @@ from agents.experiments.progress import duration
 from agents.experiments.provenance import commit, software
 from agents.experiments.store import Summary, summarise
 from agents.experiments.table import reference
-from agents.experiments.verdict import MISSING, NOT_REPRODUCED, REPRODUCED, Claim, Results
+from agents.experiments.verdict import (
+    MISSING,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    Claim,
+    Hypothesis,
+    Results,
+)
 
 TEMPLATE = Path(__file__).parent / "report_template.html"
 
@@ -37,9 +44,9 @@ def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str
         "where": claim.where,
         "words": claim.words,
         "protocol": claim.protocol,
-        "seeds": _seeds(claim, results),
+        "seeds": seeds_behind(claim, results),
         "rule": claim.rule,
-        "numbers": tuple(map(_minus, numbers)),
+        "numbers": tuple(map(minus, numbers)),
         "verdict": verdict,
         "kind": {REPRODUCED: "yes", NOT_REPRODUCED: "no", MISSING: "missing"}.get(verdict, "if"),
         "environment": claim.environment,
@@ -49,12 +56,12 @@ def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str
     }
 
 
-def _minus(text: str) -> str:
+def minus(text: str) -> str:
     """Hyphens before numbers as minus signs."""
     return re.sub(r"(?<![\w…])-(?=[\d.])", "−", text)
 
 
-def _seeds(claim: Claim, results: Results) -> str:
+def seeds_behind(claim: Claim | Hypothesis, results: Results) -> str:
     """How many pattern seeds stand behind the numbers."""
     counts = {
         name: results[name].sizes["pattern_seed"]

@@ -106,6 +106,13 @@ def median(sample: ArrayLike) -> Interval:
     return bootstrap(np.median, sample)
 
 
+def share(found: ArrayLike) -> Interval:
+    """Share of the true values, with its exact binomial interval."""
+    values = np.asarray(found, bool)
+    exact = stats.binomtest(int(values.sum()), len(values)).proportion_ci(method="exact")
+    return Interval(float(values.mean()), float(exact.low), float(exact.high))
+
+
 def interquartile_mean(values: ArrayLike) -> float:
     """Mean of the middle half: robust to the few pattern seeds on which everything fails."""
     return float(middle_means(np.ravel(values)[:, None]))

@@ -74,12 +74,14 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
         neurons, task, patterns, shared["runs"], shared["cap"],
         evaluation_seed(classes, pattern_seed), threads=1,
     )  # fmt: skip
-    weights = [getattr(neuron, "weights", np.full(task.n_inputs, np.nan)) for neuron in neurons]
-    return {
+    values = {
         "survived": survived.reshape(*block.shape, -1),
         "error_rate": history.error_rate[-1].reshape(block.shape),
-        "weights": np.reshape(weights, (*block.shape, -1)),
     }
+    weights = [getattr(neuron, "weights", np.full(task.n_inputs, np.nan)) for neuron in neurons]
+    if len({np.shape(one) for one in weights}) == 1:  # networks of several sizes fit no array
+        values["weights"] = np.reshape(weights, (*block.shape, -1))
+    return values
 
 
 def make_agent(setting: Setting, task: Task | Trials) -> Any:

@@ -294,7 +294,7 @@ def _draw(results: Results) -> Figure:
 
     data = results["FACTORS"]
     figure = Figure(figsize=(WIDE, 4.3), layout="constrained")
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.15, 1, 1))
+    grid = figure.add_gridspec(1, 3, width_ratios=(1.05, 1.05, 1.05))
     _bars(axes := figure.add_subplot(grid[0]), effects(data))
     letter(axes, "a   variance explained")
     columns = [f"{_NAMES[start]}\n{bounds}" for start in STARTS for bounds in BOUNDS]
@@ -304,7 +304,7 @@ def _draw(results: Results) -> Figure:
         mesh = axes.imshow(found.difference, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
         rows, places = np.nonzero(found.sure)
         axes.plot(places, rows, "o", color=INK, ms=2.5)
-        axes.set_xticks(range(len(columns)), columns, fontsize=6)
+        axes.set_xticks(range(len(columns)), columns, fontsize=5.5)
         labels = METHODS if place == 0 else [""] * len(METHODS)
         axes.set_yticks(range(len(METHODS)), labels, fontsize=6)
         axes.tick_params(length=0)

@@ -75,6 +75,34 @@ def test_a_new_report_leaves_nothing_of_the_old_one(places: list[str], tmp_path:
     assert not old.exists()
 
 
+def test_findings_have_a_folder_of_their_own_and_their_pictures_on_the_page(tmp_path: Path) -> None:
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "TRAP.png").write_text("png")
+    record = {
+        "size": "paper",
+        "findings": [{**CLAIM, "id": "M1", "verdict": "does not hold"}],
+        "figures": {"TRAP": "What one sees."},
+        "stores": [STORE],
+    }
+    (tmp_path / "findings.json").write_text(json.dumps(record))
+    run(
+        [
+            "--findings",
+            "--size",
+            "paper",
+            "--report",
+            str(tmp_path),
+            "--out",
+            str(tmp_path / "docs"),
+        ]
+    )
+
+    text = (tmp_path / "docs" / "paper" / "findings.md").read_text()
+    assert "| M1 | a \\| b | one<br>two | **does not hold** |" in text
+    assert "![TRAP](figures/TRAP.png)\n\n*TRAP: What one sees.*" in text
+    assert (tmp_path / "docs" / "paper" / "figures" / "TRAP.png").exists()
+
+
 def test_what_is_not_there_or_damaged_is_refused(places: list[str], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="is a report of size 'quick', not 'paper'"):
         run(places, "--size", "paper")

@@ -8,7 +8,7 @@ import pytest
 
 from agents.commands import check_report
 from agents.commands.terminal import parse
-from agents.experiments.listing import pictures
+from agents.experiments.listing import claims, pictures
 from agents.experiments.report import page, record, write
 from agents.experiments.store import Summary
 from tests.agents.experiments.worlds import as_in_the_paper, world
@@ -35,9 +35,9 @@ def test_the_page_loads_nothing_from_elsewhere(html: str) -> None:
 
 
 def test_every_claim_has_its_row_number_and_verdict(html: str) -> None:
-    assert len(check_report.ids(html)) == 17
+    assert len(check_report.ids(html)) == len(claims())
     assert "MST ahead of GNM in 0 of 5" in html
-    assert html.count("– missing") == 17 - 5
+    assert html.count("– missing") == len(claims()) - 5
     assert "no data: F3, F3-published" in html
 
 
@@ -55,10 +55,10 @@ def test_the_reference_table_stands_beside_the_prototype(html: str) -> None:
     assert re.search(r"LIF refractory 25, ALL", html)
 
 
-def test_minus_signs_are_minus_signs() -> None:
-    from agents.experiments.report import _minus
+def testminus_signs_areminus_signs() -> None:
+    from agents.experiments.report import minus
 
-    assert _minus("gain -12 [-20 … -3], F3-published, sub-threshold") == (
+    assert minus("gain -12 [-20 … -3], F3-published, sub-threshold") == (
         "gain −12 [−20 … −3], F3-published, sub-threshold"
     )
 
@@ -92,7 +92,7 @@ def test_the_page_opens_sorts_and_complains_of_nothing(html: str, tmp_path: Path
 
     found = check_report.check(path, chromium)
 
-    assert found["claims"] == 17
+    assert found["claims"] == len(claims())
     for shot in found["screenshots"].values():
         pixels = plt.imread(shot)
         assert pixels.std() > 0.05, "a picture of something"

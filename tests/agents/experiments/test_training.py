@@ -7,7 +7,7 @@ import pytest
 
 from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, train_many
 from agents.experiments.design import Axis
-from agents.experiments.methods import F7_LEARNERS, GNM_ALL, MST_ALL
+from agents.experiments.methods import F7_LEARNERS, GNM_ALL, MST_ALL, NETWORKS
 from agents.experiments.table import TABLE_LEARNERS
 from agents.experiments.training import (
     class_counts,
@@ -39,6 +39,17 @@ def test_a_block_gives_each_neuron_what_it_gets_alone() -> None:
     np.testing.assert_array_equal(values["survived"][0, 0, 2], survived)
     assert values["survived"].shape == (1, 1, 3, 3)
     assert values["error_rate"].shape == (1, 1, 3)
+
+
+def test_networks_of_several_sizes_share_a_block() -> None:
+    rows = {name: NETWORKS[name] for name in ("none hidden", "1 hidden", "2 hidden")}
+    axes = (class_counts(1), pattern_seeds((3,)), learners(rows))
+    wanted = training("toy", "", axes, **SHORT)
+    (block,) = wanted.blocks()
+    values = wanted.compute(block)
+
+    assert values["survived"].shape == (1, 1, 3, 3)
+    assert "weights" not in values
 
 
 @pytest.mark.parametrize("name", [*TABLE_LEARNERS])
