@@ -24,18 +24,21 @@ from agents.rl.hyperparameters import (
 from agents.rl.memory import LeakyPolicy, LstmPolicy
 from agents.rl.observation import RAW, TRACES, ObservationConfig
 from agents.rl.sb3_agent import SB3Agent
+from agents.rl.spiking import GnmPolicy, SpikingPolicy
 from agents.rl.vec_env import PatternVecEnv
 
 __all__ = [
     "HYPERPARAMETERS",
     "RAW",
     "TRACES",
+    "GnmPolicy",
     "Hyperparameters",
     "LeakyPolicy",
     "LstmPolicy",
     "ObservationConfig",
     "PatternVecEnv",
     "SB3Agent",
+    "SpikingPolicy",
     "load",
     "make_rl_agent",
     "read_hyperparameters",
