@@ -1,21 +1,27 @@
-"""The league's neurons and rules on a data set: who counts how many held-out trials right.
+"""A data set in the place of drawn streams: the league's neurons and rules on it, and experiments.
 
-The settings are those that the search of `tuning.py` has found on drawn streams: a start, since
-nothing is tuned on the data. Beside the entries stand what needs no neuron: silence, and the label
-that is commonest in training.
+`rank` says who counts how many held-out trials right. The settings are those that the search of
+`tuning.py` has found on drawn streams: a start, since nothing is tuned on the data. Beside the
+entries stand what needs no neuron: silence, and the label that is commonest in training.
+`on_trials` declares an experiment.
 """
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.evaluation import answers
+from agents.experiments.design import Axis, Block, Experiment, Variable
 from agents.experiments.training import make_agent
 from agents.experiments.tuning import chosen_settings, entries, feedback_of, for_trials
+from agents.registry import find_model, find_rule
 from agents.training.many import train_many
 from gnm_env import Trials
 
@@ -122,6 +128,87 @@ def _without_a_neuron(train: Trials, test: Trials) -> list[Row]:
 
 def _share(trials: Trials, count: int) -> float:
     return float(np.mean(trials.labels == count))
+
+
+# --- experiments ---------------------------------------------------------------------------------
+
+OF_AN_AGENT = {"neuron", "rule", "copy", "start", "initial_weight", "weight_bounds"}
+"""Settings that no field of a neuron or of a rule is."""
+
+
+def on_trials(
+    name: str,
+    title: str,
+    trials: Trials,
+    axes: tuple[Axis, ...],
+    *,
+    epochs: int = EPOCHS,
+    seed: int = 0,
+    by: str | None = None,
+    **common: Any,
+) -> Experiment:
+    """An experiment: one neuron per cell, trained on a part of `trials` and scored on the rest.
+
+    It keeps `exact`, the share of the held-out trials that were counted exactly, and `mean_error`,
+    the mean |label − spikes|.
+
+    Args:
+        name, title: of the experiment.
+        trials: the data set. A store that was made of another one is refused.
+        axes: the grid: fields of the neuron or of the rule, "neuron" and "rule" themselves, "copy"
+            (other initial weights), "initial_weight", "weight_bounds".
+        epochs, seed, by: as for `rank`.
+        common: what holds in every cell unless an axis sets it.
+
+    Raises ValueError for a setting that nothing takes, and as `Trials.split` does.
+    """
+    train, test = trials.split(SHARE, seed=seed, by=by)
+    common = {"neuron": "gnm", "rule": "all", "pattern_seed": seed, **common}
+    _refuse_unknown(axes, common)
+
+    def compute(block: Block) -> dict[str, NDArray[Any]]:
+        agents = [make_agent(setting, train) for setting in block.settings]
+        train_many(agents, train, trials=epochs * len(train), seed=seed, threads=1)
+        result = answers(agents, test)
+        return {
+            "exact": (1.0 - result.wrong / len(test)).reshape(block.shape),
+            "mean_error": (result.absolute / len(test)).reshape(block.shape),
+        }
+
+    variables = (
+        Variable("exact", "float64", "1", "share of held-out trials counted exactly"),
+        Variable("mean_error", "float64", "spikes", "mean |label - spikes| on held-out trials"),
+    )
+    told = {"trials": _digest(trials), "epochs": epochs, "split": [SHARE, seed, by]}
+    return Experiment(name, title, axes, common, compute, variables, protocol=told)
+
+
+def _refuse_unknown(axes: tuple[Axis, ...], common: Mapping[str, Any]) -> None:
+    sets = [[axis.setting(k) for k in range(len(axis.values))] for axis in axes]
+    for cell in itertools.product(*sets):
+        setting = dict(common)
+        for part in cell:
+            setting.update(part)
+        kinds = find_model(setting["neuron"]), find_rule(setting["rule"])
+        known = {field.name for kind in kinds for field in fields(kind)} | OF_AN_AGENT
+        unknown = sorted(setting.keys() - known - {"pattern_seed"})
+        if unknown:
+            raise ValueError(
+                f"nothing takes the setting {unknown[0]!r}: neither {kinds[0].__name__} nor "
+                f"{kinds[1].__name__} has it, and a data set is what it is: choose among "
+                f"{', '.join(sorted(known))}"
+            )
+
+
+def _digest(trials: Trials) -> str:
+    """What tells one data set from another."""
+    made = hashlib.sha256(str(trials.n_inputs).encode())
+    for array in trials.arrays[1:]:
+        made.update(np.ascontiguousarray(array).tobytes())
+    return made.hexdigest()
+
+
+# --- the table -----------------------------------------------------------------------------------
 
 
 def markdown(rows: Sequence[Row]) -> str:

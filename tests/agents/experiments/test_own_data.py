@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from agents import answers
 from agents.commands import league
 from agents.commands.terminal import parse
-from agents.experiments import own_data
+from agents.experiments import Axis, own_data
 from agents.experiments.training import make_agent
 from agents.experiments.tuning import chosen_settings, for_trials
 from agents.training.many import train_many
@@ -75,3 +76,35 @@ def test_the_command_ranks_a_file_and_keeps_the_table(tmp_path: Path) -> None:
 def test_by_without_trials_is_refused() -> None:
     with pytest.raises(ValueError, match="--by belongs to --trials"):
         league.main(parse(league, ["--by", "voice"]))
+
+
+def test_an_experiment_on_a_data_set_is_stored_and_is_what_training_by_hand_gives(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("xarray")
+    from agents.experiments.store import StoreError, read
+    from agents.experiments.sweep import sweep
+
+    axes = (
+        Axis("alpha", (0.1, 0.3), chunk=0),
+        Axis("learner", ("ALL", "ET"), settings=({"rule": "all"}, {"rule": "et"})),
+    )
+    made = own_data.on_trials("mine", "Mine", KNOWN, axes, epochs=2, learning_rate=1e-3)
+    with ThreadPoolExecutor(1) as executor:
+        sweep(made, tmp_path / "mine", executor)
+    results = read(tmp_path / "mine")
+    assert results["exact"].shape == (2, 2)
+    train, test = KNOWN.split(0.8, seed=0)
+    setting = {"neuron": "gnm", "rule": "et", "alpha": 0.3, "learning_rate": 1e-3}
+    agent = make_agent({**setting, "pattern_seed": 0}, train)
+    train_many([agent], train, trials=2 * len(train), seed=0)
+    by_hand = 1 - answers(agent, test).wrong[0] / len(test)
+    assert float(results["exact"].sel(alpha=0.3, learner="ET")) == by_hand
+    other = own_data.on_trials("mine", "Mine", KNOWN[:150], axes, epochs=2, learning_rate=1e-3)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(StoreError, match="trials"):
+        sweep(other, tmp_path / "mine", executor)
+
+
+def test_a_setting_that_nothing_takes_is_refused_when_it_is_declared() -> None:
+    with pytest.raises(ValueError, match="nothing takes the setting 'rate'"):
+        own_data.on_trials("x", "x", KNOWN, (Axis("rate", (0.1, 0.2)),))
