@@ -18,7 +18,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +28,7 @@ from agents.commands.terminal import RESULTS, Parser, at_least, share
 from agents.experiments import own_data, ranking, tuning
 from agents.experiments.design import Experiment
 from agents.experiments.league import PARTS, draw, league, read_league, rows, text_table
-from agents.experiments.progress import Progress
+from agents.experiments.progress import counted
 from agents.experiments.store import read
 from agents.experiments.sweep import sweep
 from gnm_env import Trials
@@ -58,7 +58,7 @@ def options(parser: Parser) -> None:
     add("--trials", type=Path, metavar="FILE", help="a data set, as `Trials.save` writes it: train "
         "every rule on 80 %% of it, score it on the rest")  # fmt: skip
     add("--by", metavar="COLUMN", help="of --trials: keep together what is alike in this column")
-    add("--epochs", type=at_least(1), default=own_data.EPOCHS, metavar="N", help="of --trials: how "
+    add("--epochs", type=at_least(1), metavar="N", help="of --trials: how "
         f"often each trial is heard (default {own_data.EPOCHS})")  # fmt: skip
     share(parser, "--seed", help="of --trials: of the split and of all that is drawn")
     add("--jobs", type=at_least(1), default=1, metavar="N", help="trainings at a time (default 1)")
@@ -73,8 +73,9 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     """Compute what is missing, then print and draw what is there."""
     if options.trials is not None:
         return _on_trials(options)
-    if options.by is not None:
-        raise ValueError("--by belongs to --trials FILE: add it, or leave --by out")
+    for name in ("by", "epochs"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name} belongs to --trials FILE: add it, or leave --{name} out")
     folder = options.out or RESULTS / "league" / options.size
     chosen_rows = options.rules is not None or options.neurons is not None
     parts = options.part or ([RULES] if chosen_rows or options.tune else PARTS)
@@ -111,19 +112,18 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 def _on_trials(options: argparse.Namespace) -> dict[str, Any]:
     """Rank neurons and rules on a data set, print the table and keep it."""
+    for name in ("part", "seeds", "tune", "steps", "so_far", "keep", "repair"):
+        if getattr(options, name):
+            word = name.replace("_", "-")
+            raise ValueError(
+                f"--{word} is of the league on drawn streams: leave --trials or --{word} out"
+            )
     trials = Trials.load(options.trials)
     print(trials)
-
-    def shown(names: Iterable[str]) -> Iterator[str]:
-        todo = list(names)
-        with Progress("training", len(todo), unit="entries") as progress:
-            for name in todo:
-                yield name
-                progress.advance()
-
     found = own_data.rank(
         trials, options.neurons, options.rules,
-        epochs=options.epochs, seed=options.seed, by=options.by, progress=shown,
+        epochs=options.epochs or own_data.EPOCHS, seed=options.seed, by=options.by,
+        progress=counted("training", "entries"),
     )  # fmt: skip
     text = own_data.markdown(found)
     print(text)

@@ -9,7 +9,6 @@ gnm speech --phrases FILE      train and test on these
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 
 from agents.commands.terminal import Parser, at_least, share
 from agents.experiments import speech
-from agents.experiments.progress import Progress
+from agents.experiments.progress import counted
 from agents.plotting import save
 from gnm_env import Trials
 from gnm_env.speech.phrases import SIZES, balanced, counting, digits, make_digits, part
@@ -69,16 +68,9 @@ def _make(options: argparse.Namespace) -> dict[str, Any]:
     path = options.out or Path("runs/speech/digits.npz")
     path.parent.mkdir(parents=True, exist_ok=True)
 
-    def shown(numbers: Iterable[int]) -> Iterator[int]:
-        todo = list(numbers)
-        with Progress("speaking", len(todo), unit="phrases") as progress:
-            for number in todo:
-                yield number
-                progress.advance()
-
     phrases = make_digits(
         {split: getattr(options, split) for split in SIZES},
-        word=DIGITS.index(options.word), seed=options.seed, progress=shown,
+        word=DIGITS.index(options.word), seed=options.seed, progress=counted("speaking", "phrases"),
     )  # fmt: skip
     phrases.save(path)
     print(phrases)

@@ -9,9 +9,7 @@ entries stand what needs no neuron: silence, and the label that is commonest in 
 from __future__ import annotations
 
 import hashlib
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,9 +17,8 @@ from numpy.typing import NDArray
 
 from agents.evaluation import answers
 from agents.experiments.design import Axis, Block, Experiment, Variable
-from agents.experiments.training import make_agent
+from agents.experiments.training import make_agent, refuse_unknown
 from agents.experiments.tuning import chosen_settings, entries, feedback_of, for_trials
-from agents.registry import find_model, find_rule
 from agents.training.many import train_many
 from gnm_env import Trials
 
@@ -132,9 +129,6 @@ def _share(trials: Trials, count: int) -> float:
 
 # --- experiments ---------------------------------------------------------------------------------
 
-OF_AN_AGENT = {"neuron", "rule", "copy", "start", "initial_weight", "weight_bounds"}
-"""Settings that no field of a neuron or of a rule is."""
-
 
 def on_trials(
     name: str,
@@ -164,7 +158,7 @@ def on_trials(
     """
     train, test = trials.split(SHARE, seed=seed, by=by)
     common = {"neuron": "gnm", "rule": "all", "pattern_seed": seed, **common}
-    _refuse_unknown(axes, common)
+    refuse_unknown(axes, common, task=frozenset(), run={"pattern_seed"})
 
     def compute(block: Block) -> dict[str, NDArray[Any]]:
         agents = [make_agent(setting, train) for setting in block.settings]
@@ -181,23 +175,6 @@ def on_trials(
     )
     told = {"trials": _digest(trials), "epochs": epochs, "split": [SHARE, seed, by]}
     return Experiment(name, title, axes, common, compute, variables, protocol=told)
-
-
-def _refuse_unknown(axes: tuple[Axis, ...], common: Mapping[str, Any]) -> None:
-    sets = [[axis.setting(k) for k in range(len(axis.values))] for axis in axes]
-    for cell in itertools.product(*sets):
-        setting = dict(common)
-        for part in cell:
-            setting.update(part)
-        kinds = find_model(setting["neuron"]), find_rule(setting["rule"])
-        known = {field.name for kind in kinds for field in fields(kind)} | OF_AN_AGENT
-        unknown = sorted(setting.keys() - known - {"pattern_seed"})
-        if unknown:
-            raise ValueError(
-                f"nothing takes the setting {unknown[0]!r}: neither {kinds[0].__name__} nor "
-                f"{kinds[1].__name__} has it, and a data set is what it is: choose among "
-                f"{', '.join(sorted(known))}"
-            )
 
 
 def _digest(trials: Trials) -> str:

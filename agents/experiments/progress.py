@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 from tqdm import tqdm
 
@@ -99,3 +100,19 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+_Item = TypeVar("_Item")
+
+
+def counted(name: str, unit: str) -> Callable[[Iterable[_Item]], Iterator[_Item]]:
+    """What wraps a list of things to do and shows how many are done; as for `Progress`."""
+
+    def shown(items: Iterable[_Item]) -> Iterator[_Item]:
+        todo = list(items)
+        with Progress(name, len(todo), unit=unit) as progress:
+            for item in todo:
+                yield item
+                progress.advance()
+
+    return shown

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -167,11 +167,7 @@ def _check_names(axes: tuple[Axis, ...], common: Mapping[str, Any], lengths: set
                 f"axis {axis.name} must have chunk=1, since neurons side by side share "
                 f"{shared[0]}, got {axis.chunk}"
             )
-    kinds = [{(s.get("neuron"), s.get("rule"), frozenset(s)) for s in _settings(a)} for a in axes]
-    for parts in itertools.product(*kinds):
-        neuron = _last(common["neuron"], [part[0] for part in parts])
-        rule = _last(common["rule"], [part[1] for part in parts])
-        _refuse_unknown({*common}.union(*(part[2] for part in parts)), neuron, rule)
+    refuse_unknown(axes, common)
     names = [axis.name for axis in axes]
     for needed, maker in (("classes", "class_counts(1, 2)"), ("pattern_seed", "pattern_seeds(…)")):
         if needed not in names:
@@ -180,20 +176,33 @@ def _check_names(axes: tuple[Axis, ...], common: Mapping[str, Any], lengths: set
             )
 
 
+def refuse_unknown(
+    axes: tuple[Axis, ...],
+    common: Mapping[str, Any],
+    task: Set[str] = frozenset(_TASK),
+    run: Set[str] = frozenset(_SHARED - _TASK),
+) -> None:
+    """ValueError if a cell has a setting of none of its neuron, its rule, `task` and `run`."""
+    kinds = [{(s.get("neuron"), s.get("rule"), frozenset(s)) for s in _settings(a)} for a in axes]
+    for parts in itertools.product(*kinds):
+        neuron = _last(common["neuron"], [part[0] for part in parts])
+        rule = _last(common["rule"], [part[1] for part in parts])
+        _refuse_others({*common}.union(*(part[2] for part in parts)), neuron, rule, task, run)
+
+
 def _last(default: str, given: Sequence[str | None]) -> str:
     return next((one for one in reversed(given) if one is not None), default)
 
 
-def _refuse_unknown(names: set[str], neuron: str, rule: str) -> None:
-    kinds = find_model(neuron), find_rule(rule)
-    known = [{f.name for f in fields(kind)} for kind in kinds]
-    unknown = sorted(names - _SHARED - _OWN - set().union(*known))
+def _refuse_others(names: set[str], neuron: str, rule: str, task: Set[str], run: Set[str]) -> None:
+    known = {"the task": task} if task else {}
+    for kind in (find_model(neuron), find_rule(rule)):
+        known[kind.__name__] = {f.name for f in fields(kind)}
+    known["the run"] = _OWN | run
+    unknown = sorted(names.difference(*known.values()))
     if unknown:
-        raise ValueError(
-            f"nothing takes the setting {unknown[0]!r}: neither the task ({_listed(_TASK)}), nor "
-            f"{kinds[0].__name__} ({_listed(known[0])}), nor {kinds[1].__name__} "
-            f"({_listed(known[1])}), nor the run ({_listed({*_OWN, *_SHARED} - _TASK)})"
-        )
+        takers = ", nor ".join(f"{taker} ({_listed(set(of))})" for taker, of in known.items())
+        raise ValueError(f"nothing takes the setting {unknown[0]!r}: neither {takers}")
 
 
 def _listed(names: set[str]) -> str:

@@ -209,6 +209,11 @@ def counting(phrases: Trials, word: int) -> Trials:
     """The same phrases with labels that count another digit."""
     word = whole("word", word, low=0, high=9)
     labels = [words.count(word) for words in phrases.columns["words"]]
+    return _owing(phrases, {**phrases.metadata, "word": DIGITS[word]}, labels=labels)
+
+
+def _owing(phrases: Trials, metadata: dict[str, Any], **owed: Any) -> Trials:
+    """The same spikes and columns, and what `Trials.from_arrays` is told of what is owed."""
     a = phrases.arrays
     return Trials.from_arrays(
         phrases.n_inputs,
@@ -216,9 +221,9 @@ def counting(phrases: Trials, word: int) -> Trials:
         phrases.n_spikes,
         a.channels,
         a.bins,
-        labels=labels,
         columns=phrases.columns,
-        metadata={**phrases.metadata, "word": DIGITS[word]},
+        metadata=metadata,
+        **owed,
     )
 
 
@@ -233,20 +238,14 @@ def located(phrases: Trials) -> Trials:
         [(onset, end) for said, onset, end in zip(*of_one, strict=True) if said == word]
         for of_one in zip(*columns, strict=True)
     ]
-    onsets, ends = np.array([place for of_one in places for place in of_one]).reshape(-1, 2).T
-    a = phrases.arrays
-    return Trials.from_arrays(
-        phrases.n_inputs,
-        phrases.n_bins,
-        phrases.n_spikes,
-        a.channels,
-        a.bins,
+    flat = np.array([place for of_one in places for place in of_one], np.int64).reshape(-1, 2)
+    return _owing(
+        phrases,
+        phrases.metadata,
         presentations=[len(of_one) for of_one in places],
-        onsets=onsets,
-        ends=ends,
-        targets=np.ones(len(onsets), np.int64),
-        columns=phrases.columns,
-        metadata=phrases.metadata,
+        onsets=flat[:, 0],
+        ends=flat[:, 1],
+        targets=np.ones(len(flat), np.int64),
     )
 
 

@@ -73,9 +73,18 @@ def test_the_command_ranks_a_file_and_keeps_the_table(tmp_path: Path) -> None:
     assert {"silence", "GNM, ALL"} < {row["name"] for row in json.loads(json.dumps(told))["rows"]}
 
 
-def test_by_without_trials_is_refused() -> None:
-    with pytest.raises(ValueError, match="--by belongs to --trials"):
-        league.main(parse(league, ["--by", "voice"]))
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--by", "voice"], "--by belongs to --trials"),
+        (["--epochs", 3], "--epochs belongs to --trials"),
+        (["--trials", "mine.npz", "--so-far"], "--so-far is of the league on drawn streams"),
+        (["--trials", "mine.npz", "--part", "rl"], "--part is of the league on drawn streams"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(words: list[Any], why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        league.main(parse(league, words))
 
 
 def test_an_experiment_on_a_data_set_is_stored_and_is_what_training_by_hand_gives(

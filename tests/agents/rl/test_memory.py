@@ -85,7 +85,7 @@ def test_a_fresh_policy_is_near_silence_and_hears_its_inputs(kind: str) -> None:
     assert torch.equal(outputs[~heard], silent[~heard])
 
 
-@each_kind
+@pytest.mark.parametrize("kind", (*KINDS, "gnm-ppo", "spiking-ppo"))
 def test_a_saved_policy_answers_as_before(kind: str, tmp_path: Path) -> None:
     model = make_rl_agent(
         kind, training_env(TASK, PATTERNS, kind, n_envs=4), n_steps=32, batch_size=64

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,12 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from agents import GNM, AggregateLabel, NeuronAgent, noisy_performance, record
-from agents.rl import SB3Agent, load, make_rl_agent, save, training_env
+from agents.rl import SB3Agent, make_rl_agent, training_env
 from agents.rl.spiking import NeuronLayer, Spike
 from gnm_env import Patterns, Task, Trials
 
 TASK = Task()
 PATTERNS = Patterns.draw(TASK, 1)
-KINDS = ("gnm-ppo", "spiking-ppo")
 
 
 def small(kind: str, **settings: Any) -> Any:
@@ -96,15 +94,3 @@ def test_every_weight_of_a_layer_is_trained() -> None:
     model.learn(2 * 16 * 64)
     moved = model.policy.lstm_actor.weight != before
     assert moved.float().mean() > 0.85 and bool(moved.any(dim=1).all())
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_saved_policy_answers_as_before(kind: str, tmp_path: Path) -> None:
-    model = small(kind)
-    save(tmp_path, model, kind, TASK, PATTERNS)
-    agent, task, patterns = load(tmp_path)
-    scores = [
-        noisy_performance(one, task, patterns, runs=5, cap=400, seed=3)
-        for one in (SB3Agent(model, TASK), agent)
-    ]
-    np.testing.assert_array_equal(*scores)

@@ -155,6 +155,13 @@ def test_located_phrases_owe_one_spike_where_each_counted_word_is() -> None:
         assert trial.ends.tolist() == [ends[k] for k in sevens]
 
 
+def test_phrases_without_the_word_owe_nothing_anywhere() -> None:
+    phrases = part(digits(), "test")
+    silent = phrases[np.flatnonzero(phrases.labels == 0)[:3]]
+    assert located(silent).labels.tolist() == [0, 0, 0]
+    assert not located(silent).label_only.any()
+
+
 # --- synthesis -----------------------------------------------------------------------------------
 
 
