@@ -2,8 +2,8 @@
 
 An entry is a neuron with a rule. Each is tried with `TRIES` settings: the usual ones, and the
 points of one Sobol sequence, the same for all, stretched over the ranges that `_try` names. The
-tries are scored on pattern seeds 0 to 3, at two and three classes, after a third of the league's
-trials; the best mean of the two keeps its settings. `chosen_settings` reads what the search has
+tries are scored on pattern seeds 0 to 15, at two and three classes, after as many trials as the
+league has; the best mean of the two keeps its settings. `chosen_settings` reads what the search has
 found from `league_settings.json` beside this file; `choose` makes that file's content from a
 store.
 """
@@ -28,11 +28,12 @@ from gnm_env.files import atomic_write
 if TYPE_CHECKING:
     import xarray as xr
 
-TRIES = 16
-TRIALS = 20_000
+TRIES = 32
+TRIALS = 60_000
+LANES = 8
 CHOSEN = Path(__file__).with_name("league_settings.json")
 
-SIZES = {"quick": (range(1), (2,)), "full": (range(4), (2, 3))}
+SIZES = {"quick": (range(1), (2,)), "full": (range(16), (2, 3))}
 """Pattern seeds and numbers of classes of the search; the league reports on other seeds."""
 
 
@@ -165,13 +166,13 @@ def tries(entry: Setting) -> list[Setting]:
 def _try(entry: Setting, point: NDArray[np.float64]) -> Setting:
     """One point of the search as settings of an entry, numbers to two digits.
 
-    The decay α from 0.06 to 0.4, or τ_m from 6 to 30 bins with τ_s = τ_m/4; the learning rate from
+    The decay α from 0.06 to 0.4, or τ_m from 4 to 30 bins with τ_s = τ_m/4; the learning rate from
     0.3 to 20 times the rule's own; weights in 0 … 1, in ±0.4, or unbounded; the smaller or the
     larger initial weights; a rate that falls to 0, three times in four, or a constant one.
     """
     found = {**entry, **_rates(entry["rule"], point[1]), FALLING: bool(point[4] < 0.75)}
     if entry["neuron"] == "mst":
-        tau = _between(point[0], 6.0, 30.0)
+        tau = _between(point[0], 4.0, 30.0)
         found |= {"tau_m": tau, "tau_s": tau / 4.0}
     else:
         found["alpha"] = _between(point[0], 0.06, 0.4)
@@ -209,10 +210,10 @@ def search(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Experi
     usual, classes = SIZES[size]
     tried = tries(entries()[name])
     settings = tuple(for_trials(setting, TRIALS) for setting in tried)
-    # Half of the tries side by side: as many lanes as the league needs, so that one set of
-    # compiled loops serves both.
+    # So many side by side that they fill the lanes which the league needs: one set of compiled
+    # loops serves both.
     axis = Axis(
-        "try", tuple(range(len(tried))), chunk=TRIES // 2, settings=settings,
+        "try", tuple(range(len(tried))), chunk=LANES, settings=settings,
         long_name="number of the try; 0, the usual settings",
     )  # fmt: skip
     axes = (pattern_seeds(seeds or usual), class_counts(*classes), axis)

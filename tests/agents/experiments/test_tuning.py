@@ -105,7 +105,7 @@ def test_the_search_hears_other_pattern_seeds_than_the_league() -> None:
         assert not set(seeds) & set(SIZES[size][0])
         assert max(seeds) < 100 <= min(SIZES[size][0])
     experiment = tuning.search("GNM, PSD", "full")
-    assert experiment.cells == 4 * 2 * tuning.TRIES
+    assert experiment.cells == 16 * 2 * tuning.TRIES
 
 
 def test_without_settings_it_says_how_to_make_them(tmp_path) -> None:
