@@ -275,3 +275,9 @@ def test_former_names_are_no_others() -> None:
     assert current({"published": ["published: GNM 0.3, ET", "GNM, ET, tuned λ, published"]}) == {
         "wide": ["wide: GNM 0.3, ET", "GNM, ET, tuned λ, wide"]
     }
+
+
+def test_an_axis_with_no_value_but_zero_is_no_damage(folder: Path) -> None:
+    fill(folder, toy(seeds=1))
+
+    assert read(folder)["pattern_seed"].to_numpy().tolist() == [0]
