@@ -160,7 +160,8 @@ def page(told: dict[str, Any]) -> str:
         "[reproduction.md](../../reproduction.md). "
         f"{tried['ways of training']} ways of training, {tried['protocols']:,} protocols, on "
         f"pattern seeds {seeds['coarse']}; {tried['ways that went on']} ways on seeds "
-        f"{seeds['fine']} too; what follows is on seeds {seeds['confirmed']}. Work of all threads: {told['work']}.",
+        f"{seeds['fine']} too; what follows is on seeds {seeds['confirmed']}. "
+        f"Work of all threads: {told['work']}.",
         "",
         f"| protocol | points of {len(NUMBERS)} | numbers that come back |",
         "|---|---|---|",
