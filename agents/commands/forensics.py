@@ -15,8 +15,9 @@ from typing import Any
 
 from agents.commands.sweep import workers
 from agents.commands.terminal import RESULTS, Parser, share, share_run
-from agents.experiments.forensics import SIZES, Size, best, coarse, confirmed, fine
-from agents.experiments.forensics_page import STAGES, write
+from agents.experiments.design import Experiment
+from agents.experiments.forensics import SIZES, Size, best, coarse, conditions, confirmed, fine
+from agents.experiments.forensics_page import write
 from agents.experiments.progress import duration
 from agents.experiments.store import read
 from agents.experiments.sweep import sweep
@@ -33,7 +34,7 @@ def options(parser: Parser) -> None:
 
 
 def main(options: argparse.Namespace) -> dict[str, Any]:
-    """Run the three stages; write forensics.json, forensics.md and figures/ in `--out`."""
+    """Run all stages; write forensics.json, forensics.md and figures/ in `--out`."""
     results = options.results or RESULTS / options.size
     size = SIZES[options.size]
     with workers(options) as executor:
@@ -47,10 +48,14 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def search(size: Size, results: Path, executor: Executor, *, repair: bool = False) -> None:
-    """Compute what is missing of the three stages, each of which follows from the one before."""
-    made: list[Any] = []
-    for name, build in zip(STAGES, (coarse, fine, None), strict=True):
-        wanted = build(size, *made) if build else confirmed(size, best(size, *made))
-        summary = sweep(wanted, results / name, executor, repair=repair)
-        made.append(read(results / name))
-        print(f"{name}: {wanted.cells:,} neurons, {duration(summary.wall)} of work", flush=True)
+    """Compute what is missing of the stages, each of which follows from the one before."""
+
+    def computed(wanted: Experiment) -> Any:
+        summary = sweep(wanted, results / wanted.name, executor, repair=repair)
+        print(f"{wanted.name}: {wanted.cells:,} neurons, {duration(summary.wall)}", flush=True)
+        return read(results / wanted.name)
+
+    first = computed(coarse(size))
+    second = computed(fine(size, first))
+    computed(confirmed(size, best(size, first, second)))
+    computed(conditions(size))

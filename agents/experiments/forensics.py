@@ -542,10 +542,15 @@ def best(size: Size, first: xr.Dataset, second: xr.Dataset) -> list[Protocol]:
 
 
 def confirmed(size: Size, chosen: Sequence[Protocol]) -> Experiment:
-    """Stage three: the chosen protocols and the named conditions on fresh pattern seeds."""
-    title = "The best protocols, and the named conditions, on fresh pattern seeds"
-    tried = [*chosen, *named(size)]
-    return stage("FORENSICS-confirmed", title, tried, size.confirmed, size.runs[1])
+    """Stage three: the chosen protocols on fresh pattern seeds, those of `conditions`."""
+    title = "The best protocols of the search on fresh pattern seeds"
+    return stage("FORENSICS-confirmed", title, chosen, size.confirmed, size.runs[1])
+
+
+def conditions(size: Size, seeds: tuple[int, ...] | None = None) -> Experiment:
+    """The same neurons under the conditions of the reproduction, each with its own trials."""
+    title = "The paper's numbers under the named conditions"
+    return stage("CONDITIONS", title, named(size), seeds or size.confirmed, size.runs[1])
 
 
 # --- what comes out ------------------------------------------------------------------------------

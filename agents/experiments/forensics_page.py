@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from agents.experiments.figures import FORMATS
 from agents.experiments.forensics import (
     BEST,
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STAGES = ("FORENSICS-coarse", "FORENSICS-fine", "FORENSICS-confirmed")
+STAGES = ("FORENSICS-coarse", "FORENSICS-fine", "FORENSICS-confirmed", "CONDITIONS")
 PICTURE = "FORENSICS"
 _CAPTION = (
     "Each number of the paper (shaded: the band in which it counts as come back; line: the "
@@ -54,10 +56,12 @@ _SHOWN = 10
 
 def outcome(size: Size, results: Path) -> list[Found]:
     """The confirmed protocols with their scores: the best of the search, then the conditions."""
-    first, second, third = (read(results / name) for name in STAGES)
-    scores = Scores(third)
-    chosen = [*best(size, first, second), *named(size)]
-    return [Found(one, scores.of(one)) for one in chosen]
+    first, second, third, fourth = (read(results / name) for name in STAGES)
+    ours, others = Scores(third), Scores(fourth)
+    return [
+        *(Found(one, ours.of(one)) for one in best(size, first, second)),
+        *(Found(one, others.of(one)) for one in named(size)),
+    ]
 
 
 def short(found: Sequence[Found]) -> list[str]:
@@ -161,7 +165,7 @@ def page(told: dict[str, Any]) -> str:
         f"{tried['ways of training']} ways of training, {tried['protocols']:,} protocols, on "
         f"pattern seeds {seeds['coarse']}; {tried['ways that went on']} ways on seeds "
         f"{seeds['fine']} too; what follows is on seeds {seeds['confirmed']}. "
-        f"Work of all threads: {told['work']}.",
+        f"Work: {told['work']}.",
         "",
         f"| protocol | points of {len(NUMBERS)} | numbers that come back |",
         "|---|---|---|",
@@ -225,22 +229,24 @@ def draw(found: Sequence[Found]) -> Figure:
 
 def _panel(axes: Axes, one: Number, values: Sequence[Interval]) -> None:
     """One number: its band, the paper's own, and ours under each protocol."""
-    least = min(1e-2 if one.high <= 100 else 1.0, *(max(v.value, 1e-3) for v in values))
-    lowest = 0.0 if one.share or one.low == 0 or one.high <= 2 else 0.8 * least
-    highest = max(1.15 * max(max(v.value for v in values), one.low * 1.5), lowest + 1e-3)
-    axes.axvspan(max(one.low, lowest), min(one.high, 1e6), color=GREY, alpha=0.25, lw=0)
+    ends = [end for value in values for end in value if np.isfinite(end)]
+    if one.share:
+        axes.set_xlim(0, 1)
+    elif one.high > 2:
+        axes.set_xscale("log")
+        axes.set_xlim(0.7 * min(*ends, one.low), 1.4 * max(*ends, one.at or one.low))
+        axes.xaxis.set_major_formatter("{x:g}")
+    else:
+        axes.set_xlim(0, min(max(*ends, 1.05 * one.high), 3.0))
+    low, high = axes.get_xlim()
+    axes.axvspan(max(one.low, low), min(one.high, high), color=GREY, alpha=0.25, lw=0)
     if one.at is not None:
         axes.axvline(one.at, color=INK, lw=0.9)
     for place, value in enumerate(values):
         colour = BLUE if one.back(value.value) else RED
         axes.hlines(place, value.low, value.high, color=colour, lw=1.1)
-        axes.plot(value.value, place, "o", ms=2.8, color=colour)
+        axes.plot(min(value.value, high), place, "o", ms=2.8, color=colour, clip_on=False)
     axes.axhline(BEST - 0.5, color=GREY, lw=0.6, ls=":")
-    if one.high > 100:
-        axes.set_xscale("log")
-        axes.set_xlim(max(lowest, 0.3 * min(least, one.low)), highest)
-    else:
-        axes.set_xlim(lowest, max(highest, min(one.high, 1.5) * 1.05))
     axes.set_ylim(len(values) - 0.4, -0.6)
     axes.set_title(f"{one.words}\nthe paper: {one.paper}", fontsize=6, loc="left")
     axes.tick_params(labelsize=6)

@@ -32,6 +32,7 @@ SUBJECTS = (
     "residuals",
     "lif_ratio",
     "methods",
+    "by_condition",
     "reactions",
     "table",
 )
