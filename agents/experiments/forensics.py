@@ -217,18 +217,29 @@ def setting(condition: Condition, probe: Probe) -> Setting:
     return {"classes": probe.classes, **found}
 
 
+AFTER = "after"
+"""Setting of a neuron: the numbers of trials after which it is scored, where not all are needed."""
+
+
 def neurons(protocols: Iterable[Protocol]) -> list[Setting]:
     """Every neuron that the protocols need, each once, by number of classes."""
-    found = {
-        _key(one): one
-        for protocol_ in protocols
-        for one in (setting(protocol_.condition, probe) for probe in PROBES.values())
-    }
+    found: dict[str, Setting] = {}
+    after: dict[str, set[int]] = {}
+    for protocol_ in protocols:
+        for probe in PROBES.values():
+            one = setting(protocol_.condition, probe)
+            found[_key(one)] = one
+            trials = protocol_.condition.treatment(probe.neuron).trials
+            after.setdefault(_key(one), set()).add(trials)
+    every = set().union(*after.values())
+    for key, one in found.items():
+        if after[key] != every:
+            one[AFTER] = sorted(after[key])
     return [found[key] for key in sorted(found, key=lambda key: (found[key]["classes"], key))]
 
 
 def _key(one: Setting) -> str:
-    return json.dumps(one, sort_keys=True)
+    return json.dumps({name: one[name] for name in one if name != AFTER}, sort_keys=True)
 
 
 # --- training ------------------------------------------------------------------------------------
@@ -277,24 +288,34 @@ def stage(
 
 
 def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
-    """Train the block's neurons on the stream of their pattern seed; score at each checkpoint."""
+    """Train the block's neurons on the stream of their pattern seed; score at their checkpoints.
+
+    Bins are −1 at checkpoints that a neuron does not need; after its last it is left alone.
+    """
     settings, shared = block.settings, block.settings[0]
     checkpoints, runs, cap = shared["checkpoints"], shared["runs"], shared["cap"]
     seed = shared["pattern_seed"]
-    survived = np.empty((len(settings), len(checkpoints), runs), np.int32)
+    survived = np.full((len(settings), len(checkpoints), runs), -1, np.int32)
     for classes in sorted({one["classes"] for one in settings}):
         places = [k for k, one in enumerate(settings) if one["classes"] == classes]
         task = task_of({"classes": classes})
         patterns = Patterns.draw(task, seed)
-        agents = [make_agent(settings[k], task) for k in places]
+        agents = {k: make_agent(settings[k], task) for k in places}
+        after: dict[int, Sequence[int]] = {
+            k: settings[k][AFTER] if AFTER in settings[k] else checkpoints for k in places
+        }
         stream = np.random.default_rng(training_seed(classes, seed))
         done = 0
         for at, trials in enumerate(checkpoints):
-            train_many(agents, task, patterns, trials - done, stream, threads=1)
+            learning = [agents[k] for k in places if max(after[k]) >= trials]
+            train_many(learning, task, patterns, trials - done, stream, threads=1)
             done = trials
-            survived[places, at] = noisy_performance(
-                agents, task, patterns, runs, cap, evaluation_seed(classes, seed), threads=1
-            )
+            due = [k for k in places if trials in after[k]]
+            if due:
+                survived[due, at] = noisy_performance(
+                    [agents[k] for k in due], task, patterns, runs, cap,
+                    evaluation_seed(classes, seed), threads=1,
+                )  # fmt: skip
     return {"survived": survived.reshape(*block.shape, len(checkpoints), runs)}
 
 

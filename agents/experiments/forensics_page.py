@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from agents.experiments.figures import FORMATS
 from agents.experiments.forensics import (
     BEST,
@@ -30,16 +28,16 @@ from agents.experiments.forensics import (
     ranking,
     unexplained,
 )
+from agents.experiments.forest import draw_forest
 from agents.experiments.progress import duration
 from agents.experiments.provenance import commit, software
 from agents.experiments.report import minus, stores
 from agents.experiments.statistics import Interval
 from agents.experiments.store import read, summarise
-from agents.experiments.verdict import DOES_NOT_HOLD, HOLDS
-from agents.plotting import BLUE, GREY, INK, RED, WIDE, panels, save, styled
+from agents.experiments.verdict import DOES_NOT_HOLD, HOLDS, Forest, Mark
+from agents.plotting import GREY, WIDE, panels, save, styled
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 STAGES = ("FORENSICS-coarse", "FORENSICS-fine", "FORENSICS-confirmed", "CONDITIONS")
@@ -215,38 +213,17 @@ def draw(found: Sequence[Found]) -> Figure:
     columns = 3
     rows = -(-len(NUMBERS) // columns)
     figure, grid = panels(rows, columns, width=WIDE, height=1.75 * rows)
-    labels = short(found)
-    for axes, one in zip(grid.flat, NUMBERS, strict=False):
-        _panel(axes, one, [interval(one, each.scores) for each in found])
+    for place, (axes, one) in enumerate(zip(grid.flat, NUMBERS, strict=False)):
+        draw_forest(axes, _forest(one, found), names=place % columns == 0)
+        axes.axhline(BEST - 0.5, color=GREY, lw=0.6, ls=":")
+        axes.set_title(f"{one.words}\nthe paper: {one.paper}", fontsize=6, loc="left")
+        axes.tick_params(axis="y", labelsize=5)
     for axes in grid.flat[len(NUMBERS) :]:
         axes.set_visible(False)
-    for row in grid:
-        row[0].set_yticks(range(len(labels)), labels, fontsize=5)
-        for axes in row[1:]:
-            axes.set_yticks(range(len(labels)), [])
     return figure
 
 
-def _panel(axes: Axes, one: Number, values: Sequence[Interval]) -> None:
-    """One number: its band, the paper's own, and ours under each protocol."""
-    ends = [end for value in values for end in value if np.isfinite(end)]
-    if one.share:
-        axes.set_xlim(0, 1)
-    elif one.high > 2:
-        axes.set_xscale("log")
-        axes.set_xlim(0.7 * min(*ends, one.low), 1.4 * max(*ends, one.at or one.low))
-        axes.xaxis.set_major_formatter("{x:g}")
-    else:
-        axes.set_xlim(0, min(max(*ends, 1.05 * one.high), 3.0))
-    low, high = axes.get_xlim()
-    axes.axvspan(max(one.low, low), min(one.high, high), color=GREY, alpha=0.25, lw=0)
-    if one.at is not None:
-        axes.axvline(one.at, color=INK, lw=0.9)
-    for place, value in enumerate(values):
-        colour = BLUE if one.back(value.value) else RED
-        axes.hlines(place, value.low, value.high, color=colour, lw=1.1)
-        axes.plot(min(value.value, high), place, "o", ms=2.8, color=colour, clip_on=False)
-    axes.axhline(BEST - 0.5, color=GREY, lw=0.6, ls=":")
-    axes.set_ylim(len(values) - 0.4, -0.6)
-    axes.set_title(f"{one.words}\nthe paper: {one.paper}", fontsize=6, loc="left")
-    axes.tick_params(labelsize=6)
+def _forest(one: Number, found: Sequence[Found]) -> Forest:
+    values = [interval(one, each.scores) for each in found]
+    marks = (Mark(n, v, one.back(v.value)) for n, v in zip(short(found), values, strict=True))
+    return Forest("", one.low, one.high, tuple(marks), one.at, logarithmic=one.high > 2)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.experiments.figures import draw, load
+from agents.experiments.forest import described, small
 from agents.experiments.listing import claims, experiments, pictures
 from agents.experiments.progress import duration
 from agents.experiments.provenance import commit, software
@@ -28,8 +29,10 @@ from agents.experiments.verdict import (
     Hypothesis,
     Results,
 )
+from agents.plotting import save, styled
 
 TEMPLATE = Path(__file__).parent / "report_template.html"
+_NONE: Mapping[str, str] = {}
 
 
 def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -53,7 +56,20 @@ def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str
         "seconds": round(seconds, 1),
         "duration": duration(seconds) if finding else "–",
         "command": " && ".join(f"gnm sweep {name} --size {size}" for name in claim.needs),
+        "forest": described(finding.forest) if finding and finding.forest else None,
     }
+
+
+def _forests(results: Results, folder: Path) -> dict[str, str]:
+    """The forest plots of the claims that have one, as data URLs by id."""
+    drawn = {}
+    for claim in claims():
+        finding = claim.finding(results)
+        if finding and finding.forest:
+            with styled():
+                picture = save(small(finding.forest), folder, claim.id, ("svg",))["svg"]
+            drawn[claim.id] = _inline(picture)
+    return drawn
 
 
 def minus(text: str) -> str:
@@ -75,12 +91,15 @@ def seeds_behind(claim: Claim | Hypothesis, results: Results) -> str:
     return "pattern seeds: " + ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
-def page(told: Mapping[str, Any], figures: list[dict[str, str]]) -> str:
+def page(
+    told: Mapping[str, Any], figures: list[dict[str, str]], forests: Mapping[str, str] = _NONE
+) -> str:
     """The HTML of the whole report.
 
     Args:
         told: what claims.json holds.
         figures: name, caption and source (a data URL) of each figure that was drawn.
+        forests: the forest plot of a claim (a data URL) by its id.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -92,6 +111,7 @@ def page(told: Mapping[str, Any], figures: list[dict[str, str]]) -> str:
         **told,
         counts=Counter(row["kind"] for row in told["claims"]),
         figures=figures,
+        forests=forests,
         undrawn=[name for name in pictures() if name not in drawn],
         total=duration(sum(store["seconds"] for store in told["stores"])),
     )
@@ -150,7 +170,8 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
         for name, paths in draw(pictures(), results, out / "figures").items()
     ]
     out.mkdir(parents=True, exist_ok=True)
-    (out / "index.html").write_text(page(told, figures), encoding="utf-8")
+    forests = _forests(results, out / "forests")
+    (out / "index.html").write_text(page(told, figures, forests), encoding="utf-8")
     text = json.dumps(told, indent=1, ensure_ascii=False)
     (out / "claims.json").write_text(text + "\n", encoding="utf-8")
     return {

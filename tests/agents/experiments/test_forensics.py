@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -144,13 +145,33 @@ def test_a_neuron_that_protocols_share_is_trained_once() -> None:
     assert [one["classes"] for one in shared] == sorted(one["classes"] for one in shared)
 
 
+def test_a_neuron_is_scored_where_a_protocol_needs_it_and_nowhere_else() -> None:
+    early = replace(MATCHED, gnm=replace(MATCHED.gnm, trials=20))
+    late = replace(
+        MATCHED, gnm=replace(MATCHED.gnm, trials=60), mst=replace(MATCHED.mst, trials=60)
+    )
+    needed = [
+        Protocol(replace(one, lif=replace(one.lif, trials=20)), 1_000) for one in (early, late)
+    ]
+    needed[0] = needed[0]._replace(
+        condition=replace(needed[0].condition, mst=needed[1].condition.mst)
+    )
+    wanted = stage("toy", "", needed, (3,), 2)
+    (block,) = wanted.blocks()
+    done = wanted.compute(block)["survived"].reshape(len(block.settings), 2, 2)[:, :, 0] >= 0
+
+    assert wanted.common["checkpoints"] == [20, 60]
+    scored = {one["neuron"]: row.tolist() for one, row in zip(block.settings, done, strict=True)}
+    assert scored == {"gnm": [True, True], "lif": [True, False], "mst": [False, True]}
+
+
 def test_a_checkpoint_has_the_bits_of_a_training_of_that_length() -> None:
     one = Protocol(MATCHED, 1_000)
     short, long = 40, 100
     wanted = stage("toy", "", [one], (3,), 5)
     (block,) = wanted.blocks()
     for cell in block.settings:
-        cell["checkpoints"] = [short, long]
+        cell["checkpoints"] = cell["after"] = [short, long]
     values = wanted.compute(block)["survived"].reshape(len(block.settings), 2, 5)
 
     for at, trials in enumerate((short, long)):
@@ -175,7 +196,7 @@ def test_the_whole_search_runs_goes_on_and_tells(tmp_path: Path) -> None:
 
     told = write(TOY, tmp_path, "toy", tmp_path / "out")
 
-    first, second, third = (read(tmp_path / name) for name in STAGES)
+    first, second, third, _ = (read(tmp_path / name) for name in STAGES)
     chosen = best(TOY, first, second)
     assert len(chosen) == BEST
     assert len({one.condition.name.partition(", ET")[0] for one in chosen}) == BEST
