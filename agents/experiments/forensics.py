@@ -301,9 +301,7 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
         task = task_of({"classes": classes})
         patterns = Patterns.draw(task, seed)
         agents = {k: make_agent(settings[k], task) for k in places}
-        after: dict[int, Sequence[int]] = {
-            k: settings[k][AFTER] if AFTER in settings[k] else checkpoints for k in places
-        }
+        after = {k: list(settings[k].get(AFTER, ())) or checkpoints for k in places}
         stream = np.random.default_rng(training_seed(classes, seed))
         done = 0
         for at, trials in enumerate(checkpoints):
