@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from agents.commands.findings import FINDINGS
 from agents.commands.terminal import REPORT, RESULTS, Parser, share
+from agents.experiments.former_names import standing
 from agents.experiments.store import read
 
 KEPT = ("png", "pdf")
@@ -151,7 +152,7 @@ def pack(store: Path, folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
     archive = folder / f"{store.name}.zip"
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-        for path in sorted(store.rglob("*")):
+        for path in sorted(standing(store).rglob("*")):
             if path.is_file():
-                file.write(path, path.relative_to(store))
+                file.write(path, path.relative_to(standing(store)))
     return archive

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Experiment, Setting
+from agents.experiments.former_names import current
 from agents.experiments.statistics import score
 from agents.experiments.training import class_counts, pattern_seeds, training
 from agents.registry import find_rule
@@ -189,10 +190,10 @@ def _try(entry: Setting, point: NDArray[np.float64]) -> Setting:
     else:
         found["alpha"] = _between(point[0], 0.06, 0.4)
     larger = bool(point[3] >= 0.5)
-    if entry["neuron"] == "network":  # has no bounds, and one published start
+    if entry["neuron"] == "network":  # has no bounds, and one wide start
         return {**found, "initial_weight": 0.6 if larger else 0.3}
     bounds = ((0.0, 1.0), (-0.4, 0.4), None)[int(3 * point[2])]
-    return {**found, "weight_bounds": bounds, "start": "published" if larger else "matched"}
+    return {**found, "weight_bounds": bounds, "start": "wide" if larger else "matched"}
 
 
 def _rates(rule: str, share: float) -> Setting:
@@ -275,7 +276,7 @@ def save_choices(found: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """
     known = dict(found)
     if path.exists():
-        known = json.loads(path.read_text("utf-8"))["chosen"] | known
+        known = current(json.loads(path.read_text("utf-8"))["chosen"]) | known
     chosen = {name: known[name] for name in entries() if name in known}
     with atomic_write(path) as file:
         file.write(as_json({"search": {"tries": TRIES, "kept": KEPT}, "chosen": chosen}).encode())
@@ -298,5 +299,5 @@ def chosen_settings(path: Path = CHOSEN) -> dict[str, Setting]:
     """The settings of each entry that the search chose. ValueError if the file is not there."""
     if not path.exists():
         raise ValueError(f"{path} is not there: run `gnm league --part rules --tune` to make it")
-    found = json.loads(path.read_text("utf-8"))["chosen"]
+    found = current(json.loads(path.read_text("utf-8"))["chosen"])
     return {name: entry["settings"] for name, entry in found.items()}

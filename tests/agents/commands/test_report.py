@@ -38,7 +38,7 @@ def test_every_claim_has_its_row_number_and_verdict(html: str) -> None:
     assert len(check_report.ids(html)) == len(claims())
     assert "MST ahead of GNM in 0 of 5" in html
     assert html.count("– missing") == len(claims()) - 5
-    assert "no data: F3, F3-published" in html
+    assert "no data: F3, F3-wide" in html
 
 
 def test_the_page_tells_size_rules_commands_and_cost(html: str) -> None:
@@ -58,8 +58,8 @@ def test_the_reference_table_stands_beside_the_prototype(html: str) -> None:
 def testminus_signs_areminus_signs() -> None:
     from agents.experiments.report import minus
 
-    assert minus("gain -12 [-20 … -3], F3-published, sub-threshold") == (
-        "gain −12 [−20 … −3], F3-published, sub-threshold"
+    assert minus("gain -12 [-20 … -3], F3-wide, sub-threshold") == (
+        "gain −12 [−20 … −3], F3-wide, sub-threshold"
     )
 
 

@@ -62,7 +62,7 @@ def only(start: str) -> Score:
     return lambda setting: (as_in_the_paper if setting["start"] == start else flat)(setting)
 
 
-@pytest.mark.parametrize("start", ["matched", "published"])
+@pytest.mark.parametrize("start", ["matched", "wide"])
 @pytest.mark.parametrize("id_", ["F3a", "F3b", "F3c", "F6a2", "F6b", "F7a"])
 def test_a_claim_that_holds_from_one_start_says_which(id_: str, start: str) -> None:
     expected = f"{REPRODUCED} if the initial weights are the {start} ones"
@@ -95,9 +95,9 @@ def test_a_rise_that_the_cap_hides_shows_in_the_mistakes() -> None:
 def test_the_form_of_error_trace_learning_is_a_condition() -> None:
     def modulated_alone(setting: Setting) -> float:
         good = setting["rule"] == "et" and setting.get("modulate")
-        return 1_500.0 if good and setting["start"] == "published" else 500.0
+        return 1_500.0 if good and setting["start"] == "wide" else 500.0
 
-    expected = f"{REPRODUCED} if it is modulated ET from published initial weights"
+    expected = f"{REPRODUCED} if it is modulated ET from wide initial weights"
     assert found("F7b", modulated_alone).verdict == expected
 
 
@@ -160,8 +160,8 @@ def test_the_mst_mark_may_come_back_at_the_lower_cap_alone() -> None:
         return 9_000.0 if setting["start"] == "matched" else 500.0
 
     verdict = found("F3e", skewed).verdict
-    assert "published ones and the cap is 10,000" in verdict
-    assert "published ones and the cap is 1,000" in verdict
+    assert "wide ones and the cap is 10,000" in verdict
+    assert "wide ones and the cap is 1,000" in verdict
     assert "matched" not in verdict
 
 
@@ -192,7 +192,7 @@ def test_an_optimal_line_for_more_classes_only_is_a_condition() -> None:
 
     verdict = found("F3d", later).verdict
     for classes in ("two", "three"):
-        for start in ("matched", "published"):
+        for start in ("matched", "wide"):
             assert f"the task has {classes} classes, {start} initial weights" in verdict
     assert "one class" not in verdict
 

@@ -35,7 +35,7 @@ def test_the_tries_lie_where_the_search_says() -> None:
     assert all(0.06 <= one["alpha"] <= 0.4 for one in tried)
     assert all(0.9e-3 <= one["learning_rate"] <= 60e-3 for one in tried)
     assert {one["weight_bounds"] for one in tried} == {(0.0, 1.0), (-0.4, 0.4), None}
-    assert {one["start"] for one in tried} == {"matched", "published"}
+    assert {one["start"] for one in tried} == {"matched", "wide"}
     assert sum(one["falling"] for one in tried) > sum(not one["falling"] for one in tried)
     others = tuning.tries(tuning.entries()["MST, PeakError"])[1:]
     assert [one["learning_rate"] for one in others] == [one["learning_rate"] for one in tried]
