@@ -15,8 +15,8 @@ def test_a_small_one_runs_and_its_table_has_a_row_for_each_ending(tmp_path) -> N
     assert wanted.cells == 2 * len(RULES) * len(ENDINGS)
     small = replace(wanted, common={**wanted.common, "trials": 200, "cap": 300, "runs": 100})
     with threads(1) as executor:
-        sweep(small, tmp_path, executor)
-    lines = table(read(tmp_path)).splitlines()
+        sweep(small, tmp_path / "store", executor)
+    lines = table(read(tmp_path / "store")).splitlines()
     assert len(lines) == 2 + len(RULES) * len(ENDINGS)
     assert all(("of 2" in line) == ("| constant |" not in line) for line in lines[2:])
 
