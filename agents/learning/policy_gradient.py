@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.learning.rule import BinOfTrial, Rule, decay_option
+from agents.learning.rule import BinOfTrial, Rule, average_option, decay_option
 from agents.model import Model, PSPKernel
 from agents.neurons.gnm import GNM
 from agents.simd import like, where
@@ -87,6 +87,8 @@ class PolicyGradient(Rule):
         width: ΔV, in membrane-potential units: how soft the threshold is.
         baseline_rate: ρ of r̄ ← r̄ + ρ(r − r̄), 0 … 1.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-4
@@ -94,6 +96,7 @@ class PolicyGradient(Rule):
     width: float = 0.1
     baseline_rate: float = 0.05
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "policy-gradient"
     feedback: ClassVar[str] = "reward"

@@ -46,7 +46,7 @@ def loops(model: Model, rule: Rule, width: int = 1) -> Any:
     return _loops(
         Key(
             label, advance, type(model), model.reads_V, model.readout_lag,
-            type(rule), rule.variant, rule.kernel(model).biexponential, width,
+            type(rule), rule.variant, rule.averages, rule.kernel(model).biexponential, width,
         )
     )  # fmt: skip
 
@@ -61,6 +61,7 @@ class Key(NamedTuple):
     lag: int
     rule: type[Rule]
     variant: tuple[str, bool]
+    averages: bool
     biexponential: bool
     width: int
 
@@ -70,6 +71,8 @@ class Key(NamedTuple):
         parts = [self.label, self.rule.name, "bi" if self.biexponential else "mono"]
         if self.variant != (self.rule.feedback, self.rule.learns_when_right):
             parts.append("_".join(map(str, self.variant)))
+        if self.averages:
+            parts.append("averaged")
         if not self.reads_V:
             parts.append(f"x{self.lag}")
         return "_".join(parts)
@@ -152,6 +155,7 @@ def _of_rule(key: Key) -> dict[str, Any]:
         "SEES_PRESENTATIONS": feedback == "presentations",
         "TOLD_REWARD": feedback == "reward",
         "WEIGHS": rule.weigh is not None,
+        "AVERAGES": key.averages,
         "EXPLORES": draws,
         "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
         "OwnNumbers": rule.parameters_type,

@@ -39,6 +39,8 @@ TOLD_REWARD = False
 """Whether the correction is the reward, less 1."""
 WEIGHS = False
 """Whether the rule has its own `weigh`."""
+AVERAGES = False
+"""Whether the rule averages weights over some of the trials."""
 EXPLORES = False
 """Whether the rule draws the output while it learns."""
 BY_BIN = False
