@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.commands.sweep import workers
-from agents.commands.terminal import RESULTS, Parser, share, share_run
+from agents.commands.terminal import REPORT, RESULTS, Parser, share, share_run
 from agents.experiments.design import Experiment
 from agents.experiments.forensics import SIZES, Size, best, coarse, conditions, confirmed, fine
 from agents.experiments.forensics_page import write
@@ -24,7 +24,8 @@ from agents.experiments.sweep import sweep
 from agents.experiments.workers import Executor
 
 RESUMES = True
-FORENSICS = RESULTS / "forensics"
+FORENSICS = REPORT / "forensics"
+"""Beside the report on the claims, which shows what it finds there."""
 
 
 def options(parser: Parser) -> None:

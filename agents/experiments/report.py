@@ -33,6 +33,8 @@ from agents.plotting import save, styled
 
 TEMPLATE = Path(__file__).parent / "report_template.html"
 _NONE: Mapping[str, str] = {}
+FORENSICS = "forensics"
+"""Folder beside the page with what `gnm forensics` found."""
 
 
 def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -92,7 +94,10 @@ def seeds_behind(claim: Claim | Hypothesis, results: Results) -> str:
 
 
 def page(
-    told: Mapping[str, Any], figures: list[dict[str, str]], forests: Mapping[str, str] = _NONE
+    told: Mapping[str, Any],
+    figures: list[dict[str, str]],
+    forests: Mapping[str, str] = _NONE,
+    forensics: Mapping[str, Any] | None = None,
 ) -> str:
     """The HTML of the whole report.
 
@@ -100,6 +105,7 @@ def page(
         told: what claims.json holds.
         figures: name, caption and source (a data URL) of each figure that was drawn.
         forests: the forest plot of a claim (a data URL) by its id.
+        forensics: what forensics.json holds, with the source of its figure.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -112,6 +118,7 @@ def page(
         counts=Counter(row["kind"] for row in told["claims"]),
         figures=figures,
         forests=forests,
+        forensics=forensics,
         undrawn=[name for name in pictures() if name not in drawn],
         total=duration(sum(store["seconds"] for store in told["stores"])),
     )
@@ -135,6 +142,15 @@ def stores(costs: Mapping[str, Summary]) -> list[dict[str, Any]]:
 def _inline(svg: Path) -> str:
     """A picture as a data URL, so that ids of one picture never meet those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode()
+
+
+def _forensics(folder: Path, size: str) -> dict[str, Any] | None:
+    """What `gnm forensics` left in a folder, if it is of that size."""
+    path = folder / "forensics.json"
+    found: dict[str, Any] = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    if found.get("size") != size:
+        return None
+    return {**found, "source": _inline(folder / "figures" / "FORENSICS.svg")}
 
 
 def record(results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -171,7 +187,8 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
     ]
     out.mkdir(parents=True, exist_ok=True)
     forests = _forests(results, out / "forests")
-    (out / "index.html").write_text(page(told, figures, forests), encoding="utf-8")
+    html = page(told, figures, forests, _forensics(out / FORENSICS, size))
+    (out / "index.html").write_text(html, encoding="utf-8")
     text = json.dumps(told, indent=1, ensure_ascii=False)
     (out / "claims.json").write_text(text + "\n", encoding="utf-8")
     return {
