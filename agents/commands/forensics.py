@@ -16,7 +16,16 @@ from typing import Any
 from agents.commands.sweep import workers
 from agents.commands.terminal import REPORT, RESULTS, Parser, share, share_run
 from agents.experiments.design import Experiment
-from agents.experiments.forensics import SIZES, Size, best, coarse, conditions, confirmed, fine
+from agents.experiments.forensics import (
+    SIZES,
+    Size,
+    best,
+    coarse,
+    conditions,
+    confirmed,
+    fine,
+    ranking,
+)
 from agents.experiments.forensics_page import write
 from agents.experiments.progress import duration
 from agents.experiments.store import read
@@ -58,5 +67,5 @@ def search(size: Size, results: Path, executor: Executor, *, repair: bool = Fals
 
     first = computed(coarse(size))
     second = computed(fine(size, first))
-    computed(confirmed(size, best(size, first, second)))
+    computed(confirmed(size, best(size, ranking(size, first, second))))
     computed(conditions(size))

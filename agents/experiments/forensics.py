@@ -530,7 +530,12 @@ def kept_ways(size: Size, results: xr.Dataset) -> list[Way]:
         for way, group in protocols(size).items()
     }
     order = sorted(best, key=lambda way: best[way], reverse=True)
-    return order[: max(BEST, len(order) // KEPT_SHARE)]
+    return order[: kept(size)]
+
+
+def kept(size: Size) -> int:
+    """How many ways of training go on."""
+    return max(BEST, len(size.ways) // KEPT_SHARE)
 
 
 def fine(size: Size, results: xr.Dataset) -> Experiment:
@@ -551,11 +556,11 @@ def ranking(size: Size, first: xr.Dataset, second: xr.Dataset) -> list[Found]:
     return sorted(found, key=lambda one: one.rank, reverse=True)
 
 
-def best(size: Size, first: xr.Dataset, second: xr.Dataset) -> list[Protocol]:
+def best(size: Size, ranked: Sequence[Found]) -> list[Protocol]:
     """The protocols to confirm: the best, and the best of other ways of training after it."""
     way = {one.words: name for name, group in protocols(size).items() for one in group}
     chosen: dict[Way, Protocol] = {}
-    for found in ranking(size, first, second):
+    for found in ranked:
         chosen.setdefault(way[found.protocol.words], found.protocol)
     return list(chosen.values())[:BEST]
 

@@ -22,7 +22,7 @@ from agents.experiments.forensics import (
     come_back,
     interval,
     judged,
-    kept_ways,
+    kept,
     named,
     points_interval,
     ranking,
@@ -52,12 +52,11 @@ _SHOWN = 10
 """So many protocols of the search are listed."""
 
 
-def outcome(size: Size, results: Path) -> list[Found]:
+def outcome(size: Size, ranked: Sequence[Found], results: Path) -> list[Found]:
     """The confirmed protocols with their scores: the best of the search, then the conditions."""
-    first, second, third, fourth = (read(results / name) for name in STAGES)
-    ours, others = Scores(third), Scores(fourth)
+    ours, others = (Scores(read(results / name)) for name in STAGES[2:])
     return [
-        *(Found(one, ours.of(one)) for one in best(size, first, second)),
+        *(Found(one, ours.of(one)) for one in best(size, ranked)),
         *(Found(one, others.of(one)) for one in named(size)),
     ]
 
@@ -69,10 +68,10 @@ def short(found: Sequence[Found]) -> list[str]:
 
 def write(size: Size, results: Path, name: str, out: Path) -> dict[str, Any]:
     """Judge and draw finished stages: forensics.json, forensics.md and figures/ in `out`."""
-    found = outcome(size, results)
     first, second = (read(results / stage) for stage in STAGES[:2])
-    costs = {stage: summarise(results / stage) for stage in STAGES}
     tried = ranking(size, first, second)
+    found = outcome(size, tried, results)
+    costs = {stage: summarise(results / stage) for stage in STAGES}
     told = {
         "size": name,
         "software": software(),
@@ -81,7 +80,7 @@ def write(size: Size, results: Path, name: str, out: Path) -> dict[str, Any]:
         "tried": {
             "ways of training": len(size.ways),
             "protocols": len(size.ways) * 2 * len(TRIALS) * len(CAPS),
-            "ways that went on": len(kept_ways(size, first)),
+            "ways that went on": kept(size),
             "pattern seeds": {
                 "coarse": _seeds(size.coarse),
                 "fine": _seeds(size.fine),

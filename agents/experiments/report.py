@@ -144,7 +144,7 @@ def _inline(svg: Path) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode()
 
 
-def _forensics(folder: Path, size: str) -> dict[str, Any] | None:
+def shown_forensics(folder: Path, size: str) -> dict[str, Any] | None:
     """What `gnm forensics` left in a folder, if it is of that size."""
     path = folder / "forensics.json"
     found: dict[str, Any] = json.loads(path.read_text("utf-8")) if path.exists() else {}
@@ -187,7 +187,7 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
     ]
     out.mkdir(parents=True, exist_ok=True)
     forests = _forests(results, out / "forests")
-    html = page(told, figures, forests, _forensics(out / FORENSICS, size))
+    html = page(told, figures, forests, shown_forensics(out / FORENSICS, size))
     (out / "index.html").write_text(html, encoding="utf-8")
     text = json.dumps(told, indent=1, ensure_ascii=False)
     (out / "claims.json").write_text(text + "\n", encoding="utf-8")

@@ -33,6 +33,7 @@ from agents.experiments.forensics import (
     neurons,
     points,
     protocols,
+    ranking,
     setting,
     stage,
     unexplained,
@@ -197,7 +198,7 @@ def test_the_whole_search_runs_goes_on_and_tells(tmp_path: Path) -> None:
     told = write(TOY, tmp_path, "toy", tmp_path / "out")
 
     first, second, third, _ = (read(tmp_path / name) for name in STAGES)
-    chosen = best(TOY, first, second)
+    chosen = best(TOY, ranking(TOY, first, second))
     assert len(chosen) == BEST
     assert len({one.condition.name.partition(", ET")[0] for one in chosen}) == BEST
     assert third.attrs["settings"] == json.loads(json.dumps(confirmed(TOY, chosen).settings()))
