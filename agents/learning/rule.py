@@ -96,7 +96,7 @@ class BinOfTrial(NamedTuple):
     V: Any
     """Membrane potential."""
     X: Any
-    """Readout; for a rule with a `spike_probability`, that probability."""
+    """Readout; for a rule with a `spike_probability`, that probability less `z`."""
     E: Any
     """Error trace, where the rule uses it; else the correction, the same in every bin."""
     z: Any

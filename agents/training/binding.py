@@ -143,9 +143,11 @@ def _of_rule(key: Key) -> dict[str, Any]:
     whole_trial = rule.teach is not None or rule.change is not None
     needs_readout = whole_trial or rule.bin_signal is not None
     draws = rule.spike_probability is not None
+    # Rules that learn from every trial leave no lane out, and gain nothing by smaller parts.
+    every_trial = rule.weigh is not None or feedback in ("reward", "none")
     return {
         "WIDTH": key.width,
-        "LEARN_WIDTH": min(key.width, LEARN_WIDTH),
+        "LEARN_WIDTH": key.width if every_trial else min(key.width, LEARN_WIDTH),
         "USES_ERROR": rule.uses_error and feedback == "presentations",
         "USES_OUTPUT": whole_trial or rule.uses_output,
         "USES_READOUT": draws or (needs_readout and not key.reads_V),

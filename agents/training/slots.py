@@ -32,7 +32,7 @@ USES_ERROR = False
 USES_OUTPUT = False
 """Whether it is to hold the output of each bin."""
 USES_READOUT = False
-"""Whether it is to hold the readout, which is not V, or the probability of a spike."""
+"""Whether it is to hold the readout, which is not V, or what takes its place."""
 BIEXPONENTIAL = False
 SEES_PRESENTATIONS = False
 TOLD_REWARD = False

@@ -43,8 +43,8 @@ class TrialLog(NamedTuple):
     output: Block
     """Output of each bin; kept only for rules that use it."""
     readout: Block
-    """X of each bin, kept only for rules that use it, where it is not V itself; or the probability
-    of a spike, for rules that draw them."""
+    """X of each bin, kept only for rules that use it, where it is not V itself; or, for rules that
+    draw spikes, the probability of one less the spike."""
     counts: Block
     """Output in each segment."""
 
