@@ -34,6 +34,8 @@ SUBJECTS = (
     "methods",
     "by_condition",
     "reactions",
+    "discussion",
+    "equations",
     "table",
 )
 """In the order of the paper, which is that of the report."""

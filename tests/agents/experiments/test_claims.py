@@ -14,12 +14,18 @@ from agents.experiments.verdict import MISSING, NOT_REPRODUCED, REPRODUCED, Find
 from tests.agents.experiments.worlds import Score, as_in_the_paper, world
 
 BY_ID = {claim.id: claim for claim in claims()}
+ELSEWHERE = ("D1", "D2", "D3", "D4", "D5", "D6", "D7", "F6c", "S2")
+"""Judged in tests of their own subjects."""
+
 LISTED = [
+    *ELSEWHERE,
     *("F1c", "F1d", "F2", "F3a", "F3b", "F3c", "F3d", "F3e", "F4"),
     *("F5a", "F5b", "F6a1", "F6a2", "F6b", "F7a", "F7b", "F7c", "F8"),
     *("F3e+", "F4+", "F6a1+", "F6a2+", "F6b+", "F7a+", "F7b+"),
 ]
-SCORED = [id_ for id_ in LISTED if id_ not in ("F1c", "F1d", "F2", "F8", "F4+", "F6a2+")]
+SCORED = [
+    id_ for id_ in LISTED if id_ not in (*ELSEWHERE, "F1c", "F1d", "F2", "F8", "F4+", "F6a2+")
+]
 
 
 def found(id_: str, score: Score = as_in_the_paper, seeds: int | None = 10) -> Finding:
