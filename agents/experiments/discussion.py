@@ -322,7 +322,7 @@ CLAIMS = (
         "GNM, ALL, 60,000 trials, matched initial weights, readout D without bounds; coarse map "
         "over α and η = 0, 0.2, 0.4, 0.6; the best cell with η > 0 and the best one with η = 0 are "
         "chosen on every other pattern seed and compared on the rest",
-        "reproduced unless η > 0 is surely ahead (interval above 0) for a number of classes and a "
+        "reproduced if η > 0 is surely ahead (interval above 0) for no number of classes and no "
         "readout; conditional on the readout",
         ("SPIKINESS",), _STREAM + "1 to 4 classes", _judge_spikiness,
     ),
