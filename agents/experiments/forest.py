@@ -27,8 +27,10 @@ def draw_forest(axes: Axes, forest: Forest, *, names: bool = True) -> None:
         axes.set_xscale("log")
         wanted = [end for end in (*ends, forest.low, forest.at) if end]
         axes.set_xlim(0.7 * min(wanted), 1.4 * max(wanted))
-        axes.xaxis.set_major_formatter("{x:g}")
         axes.minorticks_off()
+        steps = [step * 10.0**power for power in range(5) for step in (1, 2, 5)]
+        axes.set_xticks([step for step in steps if axes.get_xlim()[0] < step < axes.get_xlim()[1]])
+        axes.xaxis.set_major_formatter("{x:,g}")
     else:
         axes.set_xlim(0, min(max(*ends, 1.05 * min(forest.high, 1.5)), MOST_OF_A_RATIO))
     left, right = axes.get_xlim()
