@@ -25,7 +25,7 @@ from agents.training.stepwise import Heard
 from agents.training.streams import WRONG_BEYOND
 from agents.training.told import Told, segments_told, whole_trial
 from agents.training.trial import ModelBlock, RuleBlock
-from gnm_env.checks import real, shown, whole
+from gnm_env.checks import brief, real, shown, whole
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial
 
@@ -145,7 +145,8 @@ class Agent:
             place[: len(part)] = part
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self._model!r}, {self._rule!r}, n_inputs={self._n_inputs})"
+        parts = f"{brief(self._model)}, {brief(self._rule)}, n_inputs={self._n_inputs}"
+        return f"{type(self).__name__}({parts})"
 
     # --- what it is made of ----------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Rows = Sequence[Sequence[float] | NDArray[np.float64]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Answers:
     """Responses of several agents to the same trials, learning off.
 
@@ -44,6 +44,13 @@ class Answers:
     wrong: NDArray[np.int64]
     absolute: NDArray[np.float64]
     trials: int
+
+    def __repr__(self) -> str:
+        wrong = ", ".join(f"{one:,}" for one in self.wrong[:5]) + ", …" * (len(self.wrong) > 5)
+        return (
+            f"Answers(of {len(self.wrong):,} agent{'s' * (len(self.wrong) != 1)} to "
+            f"{self.trials:,} trials, {wrong} of them wrong)"
+        )
 
 
 def width_for(agents: int, widest: int) -> int:
