@@ -46,7 +46,7 @@ def check_rule(rule: Any, neuron: Any = None) -> None:
     Raises ValueError as that does, and if no weight changes in some dozens of trials.
     """
     if not isinstance(rule, Rule):
-        raise ValueError(f"rule must be an instance of a class derived from Rule, got {rule!r}")
+        raise ValueError(f"rule must be an instance of a class derived from Rule, got {_got(rule)}")
     if neuron is not None:
         _require_neuron(neuron)
     _check_teaching(GNM() if neuron is None else neuron, rule)
@@ -56,8 +56,14 @@ def check_rule(rule: Any, neuron: Any = None) -> None:
 def _require_neuron(neuron: Any) -> None:
     if not isinstance(neuron, Neuron):
         raise ValueError(
-            f"neuron must be an instance of a class derived from Neuron, got {shown(neuron)}"
+            f"neuron must be an instance of a class derived from Neuron, got {_got(neuron)}"
         )
+
+
+def _got(value: Any) -> str:
+    if isinstance(value, type):
+        return f"the class {value.__name__}; write {value.__name__}()"
+    return shown(value)
 
 
 def _check_parameters(neuron: Neuron) -> None:

@@ -36,6 +36,7 @@ _REASONS = (
         r"No definition for lowering (\w+)\(.*\)\.(\w+) =",
         "nothing can be written into a {0}; make a new one, {0}({1}=…)",
     ),
+    (r">>> (max|min)imum\(", "{0}imum is for arrays; write {0}(a, b)"),
     (r">>> where\(", "where is for arrays; write new if condition else x"),
     (r"name '(\w+)' is not defined", "the name {0} is not known"),
     (r"Untyped global name '(\w+)'", "{0} is not compiled: decorate it with gnm_env.compiled"),
