@@ -34,6 +34,7 @@ _ARRAYS = {
     "velocity": ArraySpec("f8", (None,)),
     "momentum": ArraySpec("f8", (None,)),
     "rule_memory": ArraySpec("f8", (None,)),
+    "weight_sum": ArraySpec("f8", (None,)),
     "patterns": ArraySpec("u1", (None,)),
 }
 _BIT_GENERATORS = {
@@ -95,6 +96,8 @@ def save_agent(
     contents = {"weights": agent.weights, "velocity": agent.velocity}
     if rule.memory_type is not NoMemory:
         contents["rule_memory"] = agent.rule_memory
+    if rule.averages:
+        contents["weight_sum"] = agent.weight_sum
     for name, array in contents.items():
         if not np.isfinite(array).all():
             raise ValueError(
@@ -225,6 +228,8 @@ def _agent(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
         agent.rng = _generator(header["agent_rng"])
     if "rule_memory" in arrays:
         agent.rule_memory = arrays["rule_memory"]
+    if rule.averages:
+        agent.weight_sum = arrays["weight_sum"]
     agent._trials, agent.overflowed = trials, header["overflowed"]
     return agent
 

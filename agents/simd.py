@@ -16,7 +16,11 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
     repeated(Type, x)        a NamedTuple whose fields are all x
     where(mask, x, y)        x where the mask holds, y elsewhere; both are evaluated
     any_lane(mask)           whether the mask holds anywhere
+    lanes_of(mask)           the lanes in which it holds, as bits of a number
+    next_lane(lanes)         the lowest of them
     negated(mask)            where it does not hold
+    multiply_add(x, y, z)    x·y + z, rounded once
+    times_two_to_the(x, n)   x·2**n, n a whole number plus WHOLE
     whole_power(x, n)        x**n by repeated squaring, n a whole number
     power(x, y)              x**y; one call of the C library per lane
 
@@ -203,6 +207,27 @@ def any_lane(typing_context: Any, mask: Any) -> Any:
 
 
 @_intrinsic
+def lanes_of(typing_context: Any, mask: Any) -> Any:
+    """A whole number whose bit k says whether `mask` holds in lane k; see `next_lane`."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        bits = builder.bitcast(args[0], ir.IntType(_width(mask)))
+        return builder.zext(bits, ir.IntType(64))
+
+    return types.int64(mask), generate
+
+
+@_intrinsic
+def next_lane(typing_context: Any, lanes: Any) -> Any:
+    """The lowest lane of `lanes_of`, which must not be 0; `lanes & (lanes - 1)` leaves it out."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(_BIT, 1))
+
+    return types.int64(types.int64), generate
+
+
+@_intrinsic
 def negated(typing_context: Any, mask: Any) -> Any:
     """Where `mask` does not hold (``~`` of a plain bool is a number, hence this function)."""
     return mask(mask), lambda context, builder, sig, args: builder.not_(args[0])
@@ -320,6 +345,41 @@ def repeated(typing_context: Any, type_: Any, x: Any) -> Any:
         return context.make_tuple(builder, result, [args[1]] * len(result))
 
     return result(type_, x), generate
+
+
+@_intrinsic
+def multiply_add(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
+    """x·y + z, rounded once: the same bits on every processor, in one step on most."""
+    width = max(map(_width, (x, y, z)))
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        name = f"llvm.fma.v{width}f64" if width > 1 else "llvm.fma.f64"
+        type_ = ir.FunctionType(_vector(width), [_vector(width)] * 3)
+        function = cgutils.get_or_insert_function(builder.module, type_, name)
+        values = zip(args, sig.args, strict=True)
+        return builder.call(function, [_spread(context, builder, v, t, width) for v, t in values])
+
+    return _lanes(width)(x, y, z), generate
+
+
+WHOLE = 1.5 * 2.0**52
+"""x + WHOLE is x rounded to a whole number, in the last bits of the sum; less WHOLE it is a number
+again. For |x| < 2**51."""
+
+
+@_intrinsic
+def times_two_to_the(typing_context: Any, x: Any, shifted: Any) -> Any:
+    """x·2**n for `shifted` = n + WHOLE; x and the product must be normal numbers, not 0."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = _width(x)
+        number = ir.IntType(64)
+        bits = ir.VectorType(number, width) if width > 1 else number
+        places = ir.Constant(bits, [52] * width if width > 1 else 52)
+        value, n = (builder.bitcast(arg, bits) for arg in args)
+        return builder.bitcast(builder.add(value, builder.shl(n, places)), _vector(width))
+
+    return x(x, x), generate
 
 
 @_intrinsic

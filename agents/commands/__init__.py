@@ -31,6 +31,7 @@ VERBS = {
     "sweep": "compute an experiment, the paper's or your own, into its store",
     "reproduce": "run the paper's experiments and write the report",
     "findings": "ask what the paper could not: run, judge and draw it",
+    "forensics": "find the protocol that explains the paper's numbers best",
     "figures": "draw the paper's figures from finished experiments",
     "report": "place agents of your own in the league; or judge the paper's claims",
     "reference-table": "print every neuron and rule on one to four classes",

@@ -148,10 +148,15 @@ def _rank(options: argparse.Namespace, folder: Path, names: list[str], executor:
     settings = folder / SETTINGS
     if options.tune:
         tuned = [name for name in names if name not in ranking.FIXED]
-        searches = {name: tuning.search(name, options.size) for name in tuned}
-        _seed_by_seed(searches, folder / "tuning", executor, options.repair)
-        stores = {name: folder / "tuning" / tuning.folder_name(name) for name in tuned}
-        found = {name: tuning.choose(name, read(store)) for name, store in stores.items()}
+        coarse, fine = tuning.SIZES[options.size]
+        searches = {name: tuning.search(name, coarse) for name in tuned}
+        results = _seed_by_seed(searches, folder / "tuning", executor, options.repair)
+        searches = {
+            name: tuning.search(name, fine, tuning.kept_tries(name, read(store)))
+            for name, store in results.items()
+        }
+        results = _seed_by_seed(searches, folder / "tuning-of-the-best", executor, options.repair)
+        found = {name: tuning.choose(name, read(store)) for name, store in results.items()}
         tuning.save_choices(found, settings)
     chosen = settings if settings.exists() else tuning.CHOSEN
     wanted = {n: ranking.ranking(n, options.size, options.seeds, chosen) for n in names}
@@ -160,15 +165,17 @@ def _rank(options: argparse.Namespace, folder: Path, names: list[str], executor:
 
 def _seed_by_seed(
     experiments: Mapping[str, Experiment], folder: Path, executor: Executor, repair: bool
-) -> None:
+) -> dict[str, Path]:
     """All experiments on the first pattern seed, then on the next: each has a store in `folder`.
 
-    A run that is stopped has all of them on the seeds that it came to.
+    A run that is stopped has all of them on the seeds that it came to. Returns the stores.
     """
+    stores = {name: folder / tuning.folder_name(name) for name in experiments}
     for seed in next(iter(experiments.values())).axes[0].values:
         for name, wanted in experiments.items():
-            store, only = folder / tuning.folder_name(name), ranking.on_seed(wanted, seed)
-            sweep(wanted, store, executor, repair=repair, only=only)
+            only = ranking.on_seed(wanted, seed)
+            sweep(wanted, stores[name], executor, repair=repair, only=only)
+    return stores
 
 
 def _ranked(folder: Path, names: list[str], pictures: list[str]) -> dict[str, Any]:

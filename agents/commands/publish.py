@@ -3,6 +3,7 @@
     gnm publish --size paper
     gnm publish --size quick --stores
     gnm publish --findings --size paper    what gnm findings found, in docs/findings
+    gnm publish --forensics --size paper   what gnm forensics found, in docs/forensics
 
 Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, and with
 --stores one zip per experiment. Unpacked into results/SIZE/NAME, it is the store that it was.
@@ -20,7 +21,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from agents.commands.findings import FINDINGS
+from agents.commands.forensics import FORENSICS
 from agents.commands.terminal import REPORT, RESULTS, Parser, share
+from agents.experiments import forensics_page
+from agents.experiments.former_names import standing
 from agents.experiments.store import read
 
 KEPT = ("png", "pdf")
@@ -37,6 +41,7 @@ class Kind(NamedTuple):
 
 CLAIMS = Kind("claims", "reproduce", REPORT, Path("docs") / "reproduction")
 FOUND = Kind("findings", "findings", FINDINGS, Path("docs") / "findings")
+SOUGHT = Kind("forensics", "forensics", FORENSICS, Path("docs") / "forensics")
 
 
 def options(parser: Parser) -> None:
@@ -44,31 +49,41 @@ def options(parser: Parser) -> None:
     parser.add_argument(
         "--findings", action="store_true", help="keep the findings beyond the paper, not its claims"
     )
+    parser.add_argument(
+        "--forensics", action="store_true", help="keep what explains the paper's numbers best"
+    )
     parser.add_argument("--stores", action="store_true", help="keep the stores too")
     share(parser, "--results")
     parser.add_argument(
-        "--report", type=Path, metavar="FOLDER", help=f"(default {REPORT}, or {FINDINGS})"
+        "--report",
+        type=Path,
+        metavar="FOLDER",
+        help=f"(default {REPORT}, {FINDINGS} or {FORENSICS})",
     )
-    share(parser, "--out", help=f"(default {CLAIMS.docs}, or {FOUND.docs})")
+    share(parser, "--out", help=f"(default {CLAIMS.docs}, {FOUND.docs} or {SOUGHT.docs})")
 
 
 def main(options: argparse.Namespace) -> dict[str, Any]:
     """Replace what is kept of one size."""
-    kind = FOUND if options.findings else CLAIMS
+    if options.findings and options.forensics:
+        raise ValueError("--findings and --forensics are kept one by one: leave one out")
+    kind = FOUND if options.findings else SOUGHT if options.forensics else CLAIMS
     report = options.report or kind.report
     found = told(kind, report, options.size)
     results = options.results or RESULTS / options.size
     target = (options.out or kind.docs) / options.size
     stores = [store["name"] for store in found["stores"]] if options.stores else []
+    text = forensics_page.page(found) if kind is SOUGHT else page(kind, found)
     with replaced(target) as fresh:
         (fresh / "figures").mkdir()
         for suffix in KEPT:
             for picture in sorted((report / "figures").glob(f"*.{suffix}")):
                 shutil.copy(picture, fresh / "figures")
         shutil.copy(report / f"{kind.name}.json", fresh)
-        (fresh / f"{kind.name}.md").write_text(page(kind, found), encoding="utf-8")
+        (fresh / f"{kind.name}.md").write_text(text, encoding="utf-8")
         packed = [pack(results / name, fresh / "stores").relative_to(fresh) for name in stores]
-    print(f"{len(found[kind.name])} {kind.name} and {len(packed)} stores in {target}")
+    what = f"{len(found[kind.name])} {kind.name}" if kind.name in found else kind.name
+    print(f"{what} and {len(packed)} stores in {target}")
     return {"folder": str(target), "stores": [str(target / path) for path in packed]}
 
 
@@ -151,7 +166,7 @@ def pack(store: Path, folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
     archive = folder / f"{store.name}.zip"
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-        for path in sorted(store.rglob("*")):
+        for path in sorted(standing(store).rglob("*")):
             if path.is_file():
-                file.write(path, path.relative_to(store))
+                file.write(path, path.relative_to(standing(store)))
     return archive

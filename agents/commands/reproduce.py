@@ -12,12 +12,15 @@ import argparse
 import time
 from typing import Any
 
+from agents.commands.forensics import search
 from agents.commands.report import print_verdicts
 from agents.commands.sweep import described, workers
 from agents.commands.terminal import REPORT, RESULTS, Parser, share, share_run
+from agents.experiments.forensics import SIZES
+from agents.experiments.forensics_page import write as write_forensics
 from agents.experiments.listing import experiment, experiments
 from agents.experiments.progress import duration
-from agents.experiments.report import write
+from agents.experiments.report import FORENSICS, write
 from agents.experiments.sweep import sweep
 
 RESUMES = True
@@ -43,6 +46,10 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
             summary = sweep(one, results / one.name, executor, repair=options.repair)
             costs[one.name] = described(summary)
             print(f"{one.name}: {one.cells:,} cells, {duration(summary.wall)} of work", flush=True)
+        if not options.only:
+            size = SIZES[options.size]
+            search(size, results, executor, repair=options.repair)
+            write_forensics(size, results, options.size, options.out / FORENSICS)
     written = write(results, options.size, options.out)
     print_verdicts(written)
     seconds = time.monotonic() - began

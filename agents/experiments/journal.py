@@ -169,7 +169,7 @@ def _describes_block(entry: Entry | None, store: Entry, sealed: bool) -> bool:
         if parts[: len(place)] != place or set(parts[len(place) :]) - {"0"}:
             return False
         names.add(name)
-    return names == _variables(store["files"])
+    return names == _variables(store)
 
 
 def _has_cost(entry: Entry) -> bool:
@@ -182,10 +182,15 @@ def _blocks_by_axis(settings: Any) -> list[int]:
     return [-(-len(values) // steps[name]) for name, values in settings["axes"].items()]
 
 
-def _variables(files: Iterable[str]) -> set[str]:
-    """Names of the arrays of results: of them the store's own entry has no chunks."""
+def _variables(store: Entry) -> set[str]:
+    """Names of the arrays of results: of them the store's own entry has no chunks.
+
+    Nor has it of an axis whose only value is 0, which Zarr takes for an empty chunk.
+    """
+    files, settings = store["files"], store["settings"]
     arrays = {path.partition("/")[0] for path in files if path.endswith("/zarr.json")}
-    return arrays - {path.partition("/")[0] for path in files if "/c/" in path}
+    chunked = {path.partition("/")[0] for path in files if "/c/" in path}
+    return arrays - chunked - {*settings["axes"], *settings["lengths"]}
 
 
 def _from_data(folder: Path) -> Entry | None:

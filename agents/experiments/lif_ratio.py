@@ -145,7 +145,7 @@ def _judge_three_classes(results: Results) -> Finding:
 
 _PROTOCOL = (
     "GNM (η 0, α 0.3) and LIF (α 0.3, refractory 0 … 25), ALL, 60,000 trials; matched and "
-    "published initial weights"
+    "wide initial weights"
 )
 
 CLAIMS = (

@@ -122,7 +122,7 @@ CLAIMS = (
         "F3d",
         "Fig. 3b",
         "An optimal line (1−η)α = α*",
-        "GNM, ALL, 60,000 trials, readout V; one, two and three classes; matched and published "
+        "GNM, ALL, 60,000 trials, readout V; one, two and three classes; matched and wide "
         "initial weights; 11 values of η and 16 of α; pattern seeds 200 to 215",
         "reproduced if, for one class and from both starts, the mean over α = 0.5 … 1 along the "
         "best line (1−η)α = α* exceeds that at η = 0 with an interval above 0, and is not below "

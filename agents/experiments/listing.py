@@ -32,7 +32,10 @@ SUBJECTS = (
     "residuals",
     "lif_ratio",
     "methods",
+    "by_condition",
     "reactions",
+    "discussion",
+    "equations",
     "table",
 )
 """In the order of the paper, which is that of the report."""

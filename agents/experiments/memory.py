@@ -21,7 +21,7 @@ from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.leaky_theory import naive_trap, signal_to_noise, trap
 from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
-from agents.experiments.training import PUBLISHED_START, class_counts, pattern_seeds, training
+from agents.experiments.training import WIDE_START, class_counts, pattern_seeds, training
 from agents.experiments.verdict import Finding, Hypothesis, Results
 from agents.neurons.gnm import GNM
 from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, letter, panels, silent_line
@@ -48,7 +48,7 @@ TRAP_ALPHA = tuple(float(f"{a:.5f}") for a in np.geomspace(0.01, 0.1, 24))
 TRAP_TRIALS = 20_000
 WEIGHTS_UP_TO = {
     "matched": GNM.default_initial_weight,
-    "wide": PUBLISHED_START["gnm"],
+    "wide": WIDE_START["gnm"],
 }
 
 SIZES = {"quick": (range(100, 102), (1, 2)), "paper": (range(100, 124), (1, 2, 3, 4))}

@@ -172,7 +172,7 @@ def _judge_back_propagation(results: Results) -> Finding:
 
 _PROTOCOL = (
     "η 0, α 0.3, τ_m 20, τ_s 5, 60,000 trials, every method on the same streams; matched and "
-    "published initial weights"
+    "wide initial weights"
 )
 
 CLAIMS = (

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.experiments.figures import draw, load
+from agents.experiments.forest import described, small
 from agents.experiments.listing import claims, experiments, pictures
 from agents.experiments.progress import duration
 from agents.experiments.provenance import commit, software
@@ -28,8 +29,12 @@ from agents.experiments.verdict import (
     Hypothesis,
     Results,
 )
+from agents.plotting import save, styled
 
 TEMPLATE = Path(__file__).parent / "report_template.html"
+_NONE: Mapping[str, str] = {}
+FORENSICS = "forensics"
+"""Folder beside the page with what `gnm forensics` found."""
 
 
 def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -53,7 +58,20 @@ def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str
         "seconds": round(seconds, 1),
         "duration": duration(seconds) if finding else "–",
         "command": " && ".join(f"gnm sweep {name} --size {size}" for name in claim.needs),
+        "forest": described(finding.forest) if finding and finding.forest else None,
     }
+
+
+def _forests(results: Results, folder: Path) -> dict[str, str]:
+    """The forest plots of the claims that have one, as data URLs by id."""
+    drawn = {}
+    for claim in claims():
+        finding = claim.finding(results)
+        if finding and finding.forest:
+            with styled():
+                picture = save(small(finding.forest), folder, claim.id, ("svg",))["svg"]
+            drawn[claim.id] = _inline(picture)
+    return drawn
 
 
 def minus(text: str) -> str:
@@ -75,12 +93,19 @@ def seeds_behind(claim: Claim | Hypothesis, results: Results) -> str:
     return "pattern seeds: " + ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
-def page(told: Mapping[str, Any], figures: list[dict[str, str]]) -> str:
+def page(
+    told: Mapping[str, Any],
+    figures: list[dict[str, str]],
+    forests: Mapping[str, str] = _NONE,
+    forensics: Mapping[str, Any] | None = None,
+) -> str:
     """The HTML of the whole report.
 
     Args:
         told: what claims.json holds.
         figures: name, caption and source (a data URL) of each figure that was drawn.
+        forests: the forest plot of a claim (a data URL) by its id.
+        forensics: what forensics.json holds, with the source of its figure.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -92,6 +117,8 @@ def page(told: Mapping[str, Any], figures: list[dict[str, str]]) -> str:
         **told,
         counts=Counter(row["kind"] for row in told["claims"]),
         figures=figures,
+        forests=forests,
+        forensics=forensics,
         undrawn=[name for name in pictures() if name not in drawn],
         total=duration(sum(store["seconds"] for store in told["stores"])),
     )
@@ -115,6 +142,15 @@ def stores(costs: Mapping[str, Summary]) -> list[dict[str, Any]]:
 def _inline(svg: Path) -> str:
     """A picture as a data URL, so that ids of one picture never meet those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode()
+
+
+def shown_forensics(folder: Path, size: str) -> dict[str, Any] | None:
+    """What `gnm forensics` left in a folder, if it is of that size."""
+    path = folder / "forensics.json"
+    found: dict[str, Any] = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    if found.get("size") != size:
+        return None
+    return {**found, "source": _inline(folder / "figures" / "FORENSICS.svg")}
 
 
 def record(results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -150,7 +186,9 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
         for name, paths in draw(pictures(), results, out / "figures").items()
     ]
     out.mkdir(parents=True, exist_ok=True)
-    (out / "index.html").write_text(page(told, figures), encoding="utf-8")
+    forests = _forests(results, out / "forests")
+    html = page(told, figures, forests, shown_forensics(out / FORENSICS, size))
+    (out / "index.html").write_text(html, encoding="utf-8")
     text = json.dumps(told, indent=1, ensure_ascii=False)
     (out / "claims.json").write_text(text + "\n", encoding="utf-8")
     return {

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.experiments.design import Block, Experiment
+from agents.experiments.former_names import current, standing
 from agents.experiments.journal import (
     DATA,
     JOURNAL,
@@ -134,6 +135,7 @@ def open_store(folder: Path, experiment: Experiment, *, repair: bool = False) ->
     if another process holds the store, if other settings made it, or if it is damaged; OSError if
     it cannot be written.
     """
+    folder = standing(folder)
     with _locked(folder):
         if not folder.exists():
             _create(folder, experiment)
@@ -160,7 +162,7 @@ def read(folder: str | os.PathLike[str], *, unfinished: bool = False) -> xr.Data
     """
     import xarray as xr
 
-    folder = path_of(folder, "read")
+    folder = standing(path_of(folder, "read"))
     journal = read_journal(folder)
     summary = _summary(journal)
     damaged = damaged_files(folder, [journal.known, *journal.blocks.values()])
@@ -175,12 +177,17 @@ def read(folder: str | os.PathLike[str], *, unfinished: bool = False) -> xr.Data
         loaded = dataset.load()
     # Names as plain strings: then xarray selects by them as by any label.
     names = {n: c.astype(object) for n, c in loaded.coords.items() if c.dtype.kind == "T"}
-    return loaded.assign_coords(names)
+    loaded = loaded.assign_coords({n: c.copy(data=_current(c)) for n, c in names.items()})
+    return loaded.assign_attrs(settings=current(loaded.attrs["settings"]))
+
+
+def _current(names: xr.DataArray) -> NDArray[Any]:
+    return np.array(current(names.to_numpy().tolist()), object).reshape(names.shape)
 
 
 def summarise(folder: Path) -> Summary:
     """How far the store in `folder` is. Raises StoreError if there is none."""
-    return _summary(read_journal(folder))
+    return _summary(read_journal(standing(folder)))
 
 
 def _summary(journal: Journal) -> Summary:
@@ -323,7 +330,7 @@ def _damage_report(
 
 
 def _refuse_other_settings(folder: Path, stored: Any, wanted: Any) -> None:
-    difference = _difference(stored, wanted)
+    difference = _difference(current(stored), current(wanted))
     if difference:
         raise StoreError(
             f"{folder} was made by other settings: {difference}. Choose another store, or remove "

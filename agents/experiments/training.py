@@ -22,11 +22,11 @@ from gnm_env.task import MAX_CLASSES
 RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
 """The paper's training length and measure."""
 
-PUBLISHED_START = {"gnm": 0.3, "mst": 0.2, "lif": 0.5}
-"""Upper end of the initial weights in the published code; the other start is the agents' default,
-which drives all neurons to about the same mean potential ("matched")."""
+WIDE_START = {"gnm": 0.3, "mst": 0.2, "lif": 0.5}
+"""Upper end of the initial weights in the authors' code ("wide"); the other start is the agents'
+default, which drives all neurons to about the same mean potential ("matched")."""
 
-STARTS = ("matched", "published")
+STARTS = ("matched", "wide")
 LAST_TRIALS = 5_000
 """The error rate that is kept is that of the last so many trials."""
 LARGEST_SEED = 8_999
@@ -93,8 +93,8 @@ def make_agent(setting: Setting, task: Task | Trials) -> Any:
         for kind in (find_model(setting["neuron"]), find_rule(setting["rule"]))
     )
     initial_weight = setting.get("initial_weight")
-    if setting.get("start") == "published":
-        initial_weight = PUBLISHED_START[setting["neuron"]]
+    if setting.get("start") == "wide":
+        initial_weight = WIDE_START[setting["neuron"]]
     bounds = {k: setting[k] for k in ("weight_bounds",) if k in setting}
     # Copy 0 has the weights that the pattern seed alone gives; other copies have others.
     seed = setting["pattern_seed"] + (LARGEST_SEED + 1) * setting.get("copy", 0)
@@ -115,7 +115,7 @@ def training(
             Others, and `common`, set what the task, the neuron or the rule has a field for:
             "rate", "alpha", "learning_rate"; "neuron" and "rule" themselves, by registered name or
             as "module:Class" or "file.py:Class"; "trials", "runs", "cap"; "start" ("matched" or
-            "published"), "initial_weight", "weight_bounds".
+            "wide"), "initial_weight", "weight_bounds".
         keep_weights: whether the weights at the end of training are stored.
         common: what holds in every cell unless an axis sets it.
 
@@ -217,9 +217,9 @@ def _check_values(axes: tuple[Axis, ...], common: Mapping[str, Any]) -> None:
     for setting in ({**first, **one} for axis in axes for one in _settings(axis)):
         if setting["start"] not in STARTS:
             raise ValueError(f"start must be {' or '.join(STARTS)}, got {setting['start']!r}")
-        if setting["start"] == "published" and setting["neuron"] not in PUBLISHED_START:
+        if setting["start"] == "wide" and setting["neuron"] not in WIDE_START:
             raise ValueError(
-                f"the published initial weights are those of {', '.join(PUBLISHED_START)}, not of "
+                f"the wide initial weights are those of {', '.join(WIDE_START)}, not of "
                 f"{setting['neuron']}: give initial_weight"
             )
         for name in RUN:
@@ -262,7 +262,7 @@ def protocol(task: Task, sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "defaults": {name: asdict(kind()) for name, kind in defaults.items()},
         "initial_weight": {
             "matched": {kind: types[kind].default_initial_weight for kind in neurons},
-            "published": {kind: w for kind, w in PUBLISHED_START.items() if kind in neurons},
+            "wide": {kind: w for kind, w in WIDE_START.items() if kind in neurons},
         },
         "seeds": {
             "patterns": "default_rng((pattern_seed, 1))",

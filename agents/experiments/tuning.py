@@ -1,11 +1,12 @@
 """TUNING: one search, with the same number of tries, for every neuron and every rule.
 
 An entry is a neuron with a rule. Each is tried with `TRIES` settings: the usual ones, and the
-points of one Sobol sequence, the same for all, stretched over the ranges that `_try` names. The
-tries are scored on pattern seeds 0 to 3, at two and three classes, after a third of the league's
-trials; the best mean of the two keeps its settings. `chosen_settings` reads what the search has
-found from `league_settings.json` beside this file; `choose` makes that file's content from a
-store.
+points of one Sobol sequence, the same for all, stretched over the ranges that `_try` names. All
+tries are scored on pattern seeds 0 to 7 after a third of the league's trials; the usual settings
+and the `KEPT − 1` best others then on pattern seeds 8 to 15 after all of them, and the best of
+these is chosen. A score is the mean over two and three classes. `chosen_settings` reads what the
+search has found from `league_settings.json` beside this file; `choose` makes that file's content
+from a store.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Experiment, Setting
+from agents.experiments.former_names import current
 from agents.experiments.statistics import score
 from agents.experiments.training import class_counts, pattern_seeds, training
 from agents.registry import find_rule
@@ -28,12 +30,24 @@ from gnm_env.files import atomic_write
 if TYPE_CHECKING:
     import xarray as xr
 
-TRIES = 16
-TRIALS = 20_000
+TRIES = 32
+KEPT = 8
 CHOSEN = Path(__file__).with_name("league_settings.json")
 
-SIZES = {"quick": (range(1), (2,)), "full": (range(4), (2, 3))}
-"""Pattern seeds and numbers of classes of the search; the league reports on other seeds."""
+
+class Stage(NamedTuple):
+    """One of the two stages of the search; the league reports on other pattern seeds."""
+
+    seeds: Sequence[int]
+    trials: int
+    classes: tuple[int, ...]
+
+
+SIZES = {
+    "quick": (Stage(range(1), 20_000, (2,)), Stage(range(1, 2), 60_000, (2,))),
+    "full": (Stage(range(8), 20_000, (2, 3)), Stage(range(8, 16), 60_000, (2, 3))),
+}
+"""The stage in which all tries are scored, and the one in which those are that were kept."""
 
 
 class RuleEntry(NamedTuple):
@@ -165,21 +179,21 @@ def tries(entry: Setting) -> list[Setting]:
 def _try(entry: Setting, point: NDArray[np.float64]) -> Setting:
     """One point of the search as settings of an entry, numbers to two digits.
 
-    The decay α from 0.06 to 0.4, or τ_m from 6 to 30 bins with τ_s = τ_m/4; the learning rate from
+    The decay α from 0.06 to 0.4, or τ_m from 4 to 30 bins with τ_s = τ_m/4; the learning rate from
     0.3 to 20 times the rule's own; weights in 0 … 1, in ±0.4, or unbounded; the smaller or the
     larger initial weights; a rate that falls to 0, three times in four, or a constant one.
     """
     found = {**entry, **_rates(entry["rule"], point[1]), FALLING: bool(point[4] < 0.75)}
     if entry["neuron"] == "mst":
-        tau = _between(point[0], 6.0, 30.0)
+        tau = _between(point[0], 4.0, 30.0)
         found |= {"tau_m": tau, "tau_s": tau / 4.0}
     else:
         found["alpha"] = _between(point[0], 0.06, 0.4)
     larger = bool(point[3] >= 0.5)
-    if entry["neuron"] == "network":  # has no bounds, and one published start
+    if entry["neuron"] == "network":  # has no bounds, and one wide start
         return {**found, "initial_weight": 0.6 if larger else 0.3}
     bounds = ((0.0, 1.0), (-0.4, 0.4), None)[int(3 * point[2])]
-    return {**found, "weight_bounds": bounds, "start": "published" if larger else "matched"}
+    return {**found, "weight_bounds": bounds, "start": "wide" if larger else "matched"}
 
 
 def _rates(rule: str, share: float) -> Setting:
@@ -204,42 +218,55 @@ def for_trials(setting: Mapping[str, Any], trials: int) -> Setting:
     return {**found, "decay_trials": trials} if setting[FALLING] else found
 
 
-def search(name: str, size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
-    """The search for the settings of one entry: all its tries, pattern seed by pattern seed."""
-    usual, classes = SIZES[size]
+def search(name: str, stage: Stage, numbers: Sequence[int] = tuple(range(TRIES))) -> Experiment:
+    """One stage of the search for the settings of an entry: the tries of these `numbers`."""
     tried = tries(entries()[name])
-    settings = tuple(for_trials(setting, TRIALS) for setting in tried)
-    # Half of the tries side by side: as many lanes as the league needs, so that one set of
-    # compiled loops serves both.
+    settings = tuple(for_trials(tried[number], stage.trials) for number in numbers)
+    # As many side by side as fill the lanes which the league needs: one set of compiled loops
+    # serves both.
     axis = Axis(
-        "try", tuple(range(len(tried))), chunk=TRIES // 2, settings=settings,
+        "try", tuple(numbers), chunk=KEPT, settings=settings,
         long_name="number of the try; 0, the usual settings",
     )  # fmt: skip
-    axes = (pattern_seeds(seeds or usual), class_counts(*classes), axis)
+    axes = (pattern_seeds(stage.seeds), class_counts(*stage.classes), axis)
     common = {key: settings[0][key] for key in ("neuron", "rule")}
-    return training(f"TUNING {name}", "Tries of one entry", axes, trials=TRIALS, **common)
+    return training(f"TUNING {name}", "Tries of one entry", axes, trials=stage.trials, **common)
+
+
+def kept_tries(name: str, results: xr.Dataset) -> tuple[int, ...]:
+    """The tries that the first stage leaves: the usual settings and the best others, in order."""
+    means, _ = _means(name, results)
+    others = sorted(means.keys() - {0}, key=lambda number: -means[number])
+    return (0, *sorted(others[: KEPT - 1]))
 
 
 def choose(name: str, results: xr.Dataset) -> dict[str, Any]:
-    """The best settings of an entry by what the store of its search holds.
+    """The best settings of an entry by what the store of the second stage holds."""
+    means, finished = _means(name, results)
+    best = max(means, key=lambda number: means[number])
+    return {
+        "settings": tries(entries()[name])[best],
+        "try": best,
+        "score": round(means[best]),
+        "usual": round(means[0]),
+        "pattern_seeds": finished["pattern_seed"].values.tolist(),
+        "classes": finished["classes"].values.tolist(),
+    }
 
-    Only pattern seeds that are finished count. Raises ValueError if there is none.
+
+def _means(name: str, results: xr.Dataset) -> tuple[dict[int, float], xr.Dataset]:
+    """Mean score by try over the pattern seeds that are finished, and what is finished.
+
+    Raises ValueError if none is.
     """
     survived = results["survived"].transpose("pattern_seed", ...)
     done = (survived >= 0).all(survived.dims[1:]).to_numpy()
     if not done.any():
         raise ValueError(f"the search for {name} has not finished one pattern seed: run it again")
     finished = results.isel(pattern_seed=np.flatnonzero(done))
-    means = score(finished).mean(("pattern_seed", "classes")).to_numpy()
-    best = int(np.argmax(means))
-    return {
-        "settings": tries(entries()[name])[best],
-        "try": best,
-        "score": round(float(means[best])),
-        "usual": round(float(means[0])),
-        "pattern_seeds": finished["pattern_seed"].values.tolist(),
-        "classes": finished["classes"].values.tolist(),
-    }
+    means = score(finished).mean(("pattern_seed", "classes"))
+    numbers = finished["try"].values.tolist()
+    return dict(zip(numbers, means.to_numpy().tolist(), strict=True)), finished
 
 
 def save_choices(found: Mapping[str, Mapping[str, Any]], path: Path) -> None:
@@ -249,12 +276,10 @@ def save_choices(found: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """
     known = dict(found)
     if path.exists():
-        known = json.loads(path.read_text("utf-8"))["chosen"] | known
+        known = current(json.loads(path.read_text("utf-8"))["chosen"]) | known
     chosen = {name: known[name] for name in entries() if name in known}
     with atomic_write(path) as file:
-        file.write(
-            as_json({"search": {"tries": TRIES, "trials": TRIALS}, "chosen": chosen}).encode()
-        )
+        file.write(as_json({"search": {"tries": TRIES, "kept": KEPT}, "chosen": chosen}).encode())
 
 
 def as_json(value: Mapping[str, Any]) -> str:
@@ -274,5 +299,5 @@ def chosen_settings(path: Path = CHOSEN) -> dict[str, Setting]:
     """The settings of each entry that the search chose. ValueError if the file is not there."""
     if not path.exists():
         raise ValueError(f"{path} is not there: run `gnm league --part rules --tune` to make it")
-    found = json.loads(path.read_text("utf-8"))["chosen"]
+    found = current(json.loads(path.read_text("utf-8"))["chosen"])
     return {name: entry["settings"] for name, entry in found.items()}

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from agents.experiments.statistics import Interval
 from agents.experiments.training import STARTS
 
 if TYPE_CHECKING:
@@ -24,6 +25,28 @@ Results: TypeAlias = "Mapping[str, xr.Dataset]"
 """Finished stores by the name of their experiment."""
 
 
+class Mark(NamedTuple):
+    """One number of ours beside the paper's: under what, the interval, and whether it agrees."""
+
+    label: str
+    value: Interval
+    holds: bool
+
+
+class Forest(NamedTuple):
+    """Ours under each condition beside the paper's: what a small forest plot shows.
+
+    `low` and `high` are the ends of the band in which the claim holds, `at` the paper's own number.
+    """
+
+    unit: str
+    low: float
+    high: float
+    marks: tuple[Mark, ...]
+    at: float | None = None
+    logarithmic: bool = False
+
+
 @dataclass(frozen=True)
 class Finding:
     """What a rule found.
@@ -33,12 +56,14 @@ class Finding:
         conditions: what it holds under, where it does not hold as it stands.
         numbers: ours with their intervals, in words.
         judged: False where the stores are there and yet leave nothing to compare.
+        forest: ours under each condition beside the paper's, where that can be drawn.
     """
 
     holds: bool
     conditions: Mapping[str, bool]
     numbers: tuple[str, ...]
     judged: bool = True
+    forest: Forest | None = None
 
     @property
     def verdict(self) -> str:

@@ -223,7 +223,7 @@ def _judge_reversals(results: Results) -> Finding:
 
 
 def _judge_own_cell(results: Results) -> Finding:
-    row, column = list(METHODS).index("ALL, λ"), 2 * STARTS.index("published")
+    row, column = list(METHODS).index("ALL, λ"), 2 * STARTS.index("wide")
     held, words = {}, []
     for neuron in ("MST", "LIF"):
         found = ranking(results["FACTORS"], neuron)
@@ -285,8 +285,6 @@ HYPOTHESES = (
 
 # --- the figure ----------------------------------------------------------------------------------
 
-_NAMES = {"published": "wide", "matched": "matched"}
-
 
 def _draw(results: Results) -> Figure:
     """Variance explained, and the standing of MST and LIF beside the GNM in every cell."""
@@ -297,7 +295,7 @@ def _draw(results: Results) -> Figure:
     grid = figure.add_gridspec(1, 3, width_ratios=(1.05, 1.05, 1.05))
     _bars(axes := figure.add_subplot(grid[0]), effects(data))
     letter(axes, "a   variance explained")
-    columns = [f"{_NAMES[start]}\n{bounds}" for start in STARTS for bounds in BOUNDS]
+    columns = [f"{start}\n{bounds}" for start in STARTS for bounds in BOUNDS]
     for place, (neuron, name) in enumerate((("MST", "b"), ("LIF", "c"))):
         axes = figure.add_subplot(grid[place + 1])
         found = ranking(data, neuron)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.learning.rule import Rule, RuleParameters, decay_option
+from agents.learning.rule import Rule, RuleParameters, average_option, decay_option
 from agents.simd import any_lane, like, load, store, where
 from gnm_env.checks import real
 from gnm_env.compiled import compiled, inlined
@@ -172,6 +172,8 @@ class AggregateLabel(Rule):
         trace_decay: decay factor per bin of the presynaptic trace in place of the neuron's own
             response (None); 0 reads the paper's ∫ I_i V dt literally.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-4
@@ -179,6 +181,7 @@ class AggregateLabel(Rule):
     fraction: float = 0.1
     trace_decay: float | None = None
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "all"
     feedback: ClassVar[str] = "sign"

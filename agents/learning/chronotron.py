@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.learning.alignment import teach_alignment
 from agents.learning.peaks import spike_bins
-from agents.learning.rule import decay_option
+from agents.learning.rule import average_option, decay_option
 from agents.learning.spike_times import SpikeTimesRule, differences, target_bins
 from agents.learning.teaching import HeardTrial, accumulate
 from agents.model import Model, PSPKernel
@@ -68,6 +68,8 @@ class Chronotron(SpikeTimesRule):
         tau_q: τ_q in bins; None: the time constant of the neuron's membrane.
         gamma_r: γ_r; None: τ_q.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 3e-3
@@ -77,6 +79,7 @@ class Chronotron(SpikeTimesRule):
     tau_q: float | None = None
     gamma_r: float | None = None
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "chronotron"
     parameters_type: ClassVar[Any] = Parameters

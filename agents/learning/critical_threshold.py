@@ -16,7 +16,7 @@ from agents.learning.peaks import (
     spike_bins,
     spike_peaks,
 )
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.learning.teaching import HeardTrial
 from agents.model import Model
 
@@ -72,12 +72,15 @@ class CriticalThreshold(Rule):
         momentum: fraction of the previous weight change that is added, 0 … 1.
         amount: teach as many spikes at once as are missing or too many, not only the nearest.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-2
     momentum: float = 0.2
     amount: bool = False
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "critical"
     feedback: ClassVar[str] = "sign"

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.simd import load
 from gnm_env.compiled import inlined
 
@@ -46,6 +46,8 @@ class ErrorTrace(Rule):
         trace_decay: decay factor per bin of the presynaptic trace in place of the neuron's own
             response (None); 0 reads the paper's ∫ I_i E dt literally.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-4
@@ -53,6 +55,7 @@ class ErrorTrace(Rule):
     modulate: bool = False
     trace_decay: float | None = None
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "et"
     feedback: ClassVar[str] = "presentations"

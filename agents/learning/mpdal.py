@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from agents.learning.peaks import highest_missed, mark
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.learning.teaching import HeardTrial
 
 
@@ -38,11 +38,14 @@ class MPDAL(Rule):
         learning_rate: λ; weights are best left unbounded.
         momentum: fraction of the previous weight change that is added, 0 … 1.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-2
     momentum: float = 0.2
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "mpdal"
     feedback: ClassVar[str] = "sign"

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.model import Block, Model
 from agents.simd import like, load, store
 from gnm_env.checks import real
@@ -80,6 +80,8 @@ class MSTDPET(Rule):
         tau_e: τ_e in bins, of the eligibility trace.
         a_plus, a_minus: A⁺ and A⁻.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-2
@@ -89,6 +91,7 @@ class MSTDPET(Rule):
     a_plus: float = 1.0
     a_minus: float = 1.0
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "mstdpet"
     feedback: ClassVar[str] = "reward"

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from agents.learning.peaks import extremes, mark, missed_peaks, spike_bins, spike_peaks
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.learning.teaching import HeardTrial
 
 
@@ -54,12 +54,15 @@ class PeakError(Rule):
         momentum: fraction of the previous weight change that is added, 0 … 1.
         first_only: stop at the first mistake of the trial, as the noisy performance does.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 3e-3
     momentum: float = 0.2
     first_only: bool = False
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "peak-error"
     feedback: ClassVar[str] = "presentations"

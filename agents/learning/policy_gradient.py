@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.learning.rule import BinOfTrial, Rule, decay_option
+from agents.learning.logistic import logistic
+from agents.learning.rule import BinOfTrial, Rule, average_option, decay_option
 from agents.model import Model, PSPKernel
 from agents.neurons.gnm import GNM
 from agents.simd import like, where
@@ -31,22 +32,6 @@ class Memory(NamedTuple):
 
 
 @compiled
-def logistic(x: Any) -> Any:
-    """1 / (1 + e^(−x)), x within −40 … 40, in multiplications that are the same in every lane.
-
-    e^(−x) is the 1,024th power of e^(−x/1,024), which is the sum of its first eight terms.
-    """
-    x = where(x < -40.0, -40.0, where(x > 40.0, 40.0, x))
-    s = x * (-1.0 / 1024.0)
-    power = 1.0 / 720.0 + s * (1.0 / 5040.0)
-    power = 1.0 / 24.0 + s * (1.0 / 120.0 + s * power)
-    power = 1.0 + s * (1.0 + s * (0.5 + s * (1.0 / 6.0 + s * power)))
-    for _ in range(10):
-        power = power * power
-    return 1.0 / (1.0 + power)
-
-
-@compiled
 def spike_probability(p: Parameters, V: Any, threshold: Any) -> Any:
     """P = σ((V − ϑ)/ΔV)."""
     return logistic((V - threshold) * p.slope)
@@ -54,8 +39,8 @@ def spike_probability(p: Parameters, V: Any, threshold: Any) -> Any:
 
 @compiled
 def bin_signal(p: Parameters, b: BinOfTrial) -> Any:
-    """y(t) = (r − r̄) (z(t) − P(t)) / ΔV."""
-    return b.E * (b.z - b.X) * p.slope
+    """y(t) = (r − r̄) (z(t) − P(t)) / ΔV; X is P − z."""
+    return b.E * p.slope * -b.X
 
 
 @compiled
@@ -87,6 +72,8 @@ class PolicyGradient(Rule):
         width: ΔV, in membrane-potential units: how soft the threshold is.
         baseline_rate: ρ of r̄ ← r̄ + ρ(r − r̄), 0 … 1.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-4
@@ -94,11 +81,11 @@ class PolicyGradient(Rule):
     width: float = 0.1
     baseline_rate: float = 0.05
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "policy-gradient"
     feedback: ClassVar[str] = "reward"
     needs_spikes: ClassVar[bool] = True
-    uses_output: ClassVar[bool] = True
     parameters_type: ClassVar[Any] = Parameters
     memory_type: ClassVar[Any] = Memory
     spike_probability: ClassVar[Any] = spike_probability

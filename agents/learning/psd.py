@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.learning.rule import decay_option
+from agents.learning.rule import average_option, decay_option
 from agents.learning.spike_times import SpikeTimesRule, teach_difference
 from agents.model import Model, PSPKernel
 from agents.neurons.mst import MST
@@ -38,6 +38,8 @@ class PSD(SpikeTimesRule):
         slow: time constant in bins of the current's decay …
         fast: … and of its rise.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 3e-3
@@ -46,6 +48,7 @@ class PSD(SpikeTimesRule):
     slow: float = 10.0
     fast: float = 2.5
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "psd"
     parameters_type: ClassVar[Any] = Parameters

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from agents.learning.peaks import spike_bins
-from agents.learning.rule import decay_option
+from agents.learning.rule import average_option, decay_option
 from agents.learning.spike_times import SpikeTimesRule, differences, target_bins
 from agents.learning.teaching import HeardTrial, accumulate
 from agents.model import Model, PSPKernel
@@ -59,6 +59,8 @@ class ReSuMe(SpikeTimesRule):
         a: what each target adds to every weight, and each output spike takes away.
         tau: τ in bins; None: that of the neuron's own membrane.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 3e-3
@@ -67,6 +69,7 @@ class ReSuMe(SpikeTimesRule):
     a: float = 0.0
     tau: float | None = None
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "resume"
     parameters_type: ClassVar[Any] = Parameters

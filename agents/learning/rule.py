@@ -42,7 +42,7 @@ from agents import registry
 from agents.model import Model, PSPKernel
 from agents.portable import portable
 from agents.simd import like, load, store, where
-from gnm_env.checks import real, whole
+from gnm_env.checks import real, shown, whole
 from gnm_env.compiled import inlined
 
 FEEDBACK: Mapping[str, str] = {
@@ -53,6 +53,9 @@ FEEDBACK: Mapping[str, str] = {
     "none": "nothing",
 }
 """What a rule may know of a trial, by the name of its `feedback`."""
+
+MOST_TRIALS = 10**12
+"""That a rule may name."""
 
 
 class Outcome(NamedTuple):
@@ -81,6 +84,10 @@ class RuleParameters(NamedTuple):
     scale: Any
     decay: Any
     """Fraction of the learning rate that each trial takes away; 0 for a constant rate."""
+    average_first: Any
+    """First trial, counted from 1, after which the weights count for their mean …"""
+    average_last: Any
+    """… and the last one, after which they become it; both 0 for a rule that takes none."""
 
 
 class BinOfTrial(NamedTuple):
@@ -89,7 +96,7 @@ class BinOfTrial(NamedTuple):
     V: Any
     """Membrane potential."""
     X: Any
-    """Readout; for a rule with a `spike_probability`, that probability."""
+    """Readout; for a rule with a `spike_probability`, that probability less `z`."""
     E: Any
     """Error trace, where the rule uses it; else the correction, the same in every bin."""
     z: Any
@@ -160,7 +167,7 @@ class _OwnNumbers:
 
     def __get__(self, instance: Any, owner: type) -> type:
         numeric = ("float", "int", "bool", float, int, bool)
-        common = {"learning_rate", "momentum", "decay_trials"}
+        common = {"learning_rate", "momentum", "decay_trials", "average_over"}
         own = [f.name for f in fields(owner) if f.type in numeric and f.name not in common]
         made = NamedTuple("Parameters", [(name, Any) for name in own or ["unused"]])  # type: ignore[misc]
         # Where the compile cache finds it again.
@@ -176,6 +183,7 @@ class Rule(ABC):
     momentum: float
     trace_decay: float | None = None
     decay_trials: int | None = None
+    average_over: tuple[int, int] | None = None
 
     name: ClassVar[str]
     feedback: ClassVar[str]
@@ -241,7 +249,9 @@ class Rule(ABC):
         if self.trace_decay is not None:
             real("trace_decay", self.trace_decay, low=0.0, high=1.0)
         if self.decay_trials is not None:
-            whole("decay_trials", self.decay_trials, low=1, high=10**12)
+            whole("decay_trials", self.decay_trials, low=1, high=MOST_TRIALS)
+        if self.average_over is not None:
+            object.__setattr__(self, "average_over", _first_and_last(self.average_over))
 
     def kernel(self, model: Model) -> PSPKernel:
         """The presynaptic trace: the neuron's own, or the decay per bin that the user gave.
@@ -267,12 +277,18 @@ class Rule(ABC):
         decay = 0.0 if self.decay_trials is None else 1.0 / self.decay_trials
         return (
             self.learning_rate, self.momentum, *bounds,
-            kernel.slow, kernel.fast, kernel.scale, decay, *self.own_numbers(model),
+            kernel.slow, kernel.fast, kernel.scale, decay,
+            *(float(trial) for trial in self.average_over or (0, 0)), *self.own_numbers(model),
         )  # fmt: skip
 
     def own_numbers(self, model: Model) -> tuple[float, ...]:
         """The numbers of `parameters_type`: the fields of these names."""
         return tuple(float(getattr(self, name, 0.0)) for name in self.parameters_type._fields)
+
+    @property
+    def averages(self) -> bool:
+        """Whether weights are averaged, see `agents.learning.averaging`."""
+        return self.average_over is not None
 
     @property
     def variant(self) -> tuple[str, bool]:
@@ -309,3 +325,22 @@ class Rule(ABC):
 def decay_option() -> Any:
     """The field `decay_trials` of a rule: trials over which the rate falls to 0; None: never."""
     return field(default=None, kw_only=True)
+
+
+def average_option() -> Any:
+    """The field `average_over` of a rule: the trials, first and last, over which weights are
+    averaged, see `agents.learning.averaging`; None: they are not."""
+    return field(default=None, kw_only=True)
+
+
+def _first_and_last(trials: Any) -> tuple[int, int]:
+    """`average_over`, checked."""
+    try:
+        first, last = trials
+    except (TypeError, ValueError):
+        raise ValueError(
+            "average_over must be (first, last), the trials over which weights are averaged, "
+            f"counted from 1, or None, got {shown(trials)}"
+        ) from None
+    first = whole("the first trial of average_over", first, low=1, high=MOST_TRIALS)
+    return first, whole("the last trial of average_over", last, low=first, high=MOST_TRIALS)

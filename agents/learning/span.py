@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.learning.rule import decay_option
+from agents.learning.rule import average_option, decay_option
 from agents.learning.spike_times import SpikeTimesRule, teach_difference
 from agents.learning.teaching import HeardTrial
 from agents.model import Model, PSPKernel
@@ -72,6 +72,8 @@ class SPAN(SpikeTimesRule):
             highest peaks, or "even", evenly spaced in each presentation.
         tau: τ in bins.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-4
@@ -79,6 +81,7 @@ class SPAN(SpikeTimesRule):
     times: str = "choose"
     tau: float = 5.0
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "span"
     parameters_type: ClassVar[Any] = Parameters

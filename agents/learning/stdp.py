@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.model import Block, Model
 from agents.simd import like, load, store, where
 from gnm_env.checks import real
@@ -83,6 +83,8 @@ class STDP(Rule):
         a_plus, a_minus: a⁺ and a⁻, largest change up and down.
         tau_plus, tau_minus: τ⁺ and τ⁻ in bins.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1.0
@@ -92,6 +94,7 @@ class STDP(Rule):
     tau_plus: float = 16.8
     tau_minus: float = 33.7
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "stdp"
     feedback: ClassVar[str] = "none"

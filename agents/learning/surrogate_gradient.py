@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.learning.rule import BinOfTrial, Rule, decay_option
+from agents.learning.rule import BinOfTrial, Rule, average_option, decay_option
 from agents.model import Model
 from agents.simd import any_lane, like, where
 from gnm_env.checks import choice, real
@@ -59,6 +59,8 @@ class SurrogateGradient(Rule):
         k: steepness of SuperSpike, per unit of the readout.
         on_count: learn from the error of the whole trial alone.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-2
@@ -67,6 +69,7 @@ class SurrogateGradient(Rule):
     k: float = 5.0
     on_count: bool = False
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "surrogate"
     feedback: ClassVar[str] = "presentations"

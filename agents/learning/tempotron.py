@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from agents.learning.critical import membrane_decay
 from agents.learning.peaks import mark
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.learning.teaching import HeardTrial
 from agents.model import Model
 
@@ -62,11 +62,14 @@ class Tempotron(Rule):
         learning_rate: λ; weights are best left unbounded.
         momentum: fraction of the previous weight change that is added, 0 … 1.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 1e-2
     momentum: float = 0.2
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "tempotron"
     feedback: ClassVar[str] = "label"

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.model import Model, PSPKernel
 from agents.network.backpropagation import RuleNumbers, backpropagated_change
 from agents.network.dynamics import NetworkParams, State, advance_for, largest_ratio
@@ -143,6 +143,8 @@ class BackPropagation(Rule):
         max_step: longest step that one trial may cause, momentum aside: the Euclidean length of the
             change of all weights together; infinity sets no limit.
         decay_trials: trials over which the learning rates fall to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate_hidden: float = 3e-3
@@ -152,6 +154,7 @@ class BackPropagation(Rule):
     lift_above: bool = False
     max_step: float = 0.3
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "bp"
     feedback: ClassVar[str] = "presentations"

@@ -13,6 +13,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from agents import checkpoint, registry
+from agents.learning.averaging import average_alone
 from agents.learning.rule import FEEDBACK, Rule
 from agents.model import Arrays, Model
 from agents.recording import Recording
@@ -86,6 +87,7 @@ class Agent:
         self._weights = np.clip(drawn, *self.bounds)
         self._velocity = np.zeros(size)
         self._rule_memory = np.zeros(len(rule.memory_type._fields))
+        self._weight_sum = np.zeros(size if rule.averages else 0)
         self.rng = np.random.default_rng((seed, 3)) if rule.spike_probability else None
         self._silence = np.ones(2)
         self._trials = 0
@@ -211,6 +213,16 @@ class Agent:
         put("rule_memory", values, self._rule_memory)
 
     @property
+    def weight_sum(self) -> NDArray[np.float64]:
+        """float64, sum of the weights that count for their mean so far; no numbers where the rule
+        takes none. Assigning copies, checked."""
+        return self._weight_sum
+
+    @weight_sum.setter
+    def weight_sum(self, values: ArrayLike) -> None:
+        put("weight_sum", values, self._weight_sum)
+
+    @property
     def potential(self) -> float:
         """Membrane potential in the bin that `act` heard last, before any reset; 0 before any.
 
@@ -320,6 +332,11 @@ class Agent:
         except COMPILING as error:
             raise explained(error, self._model, self._rule) from None
         self.overflowed = outcome < 0
+        if self._rule.averages and not self.overflowed:
+            average_alone(
+                self._rule_block.parameters, float(self._trials),
+                self._block.arrays.weights, self._weight_sum[:, None],
+            )  # fmt: skip
 
     def _told(self, reward: float, info: Mapping[str, Any], sign_only: bool) -> Told:
         """What the rule may know, checked."""
@@ -453,7 +470,7 @@ class Agent:
         biexponential = rule.kernel(model).biexponential
         return (
             type(self), advance, model.static(self._n_inputs), type(rule), rule.variant,
-            rule.static(self._n_inputs), biexponential, self._n_inputs,
+            rule.averages, rule.static(self._n_inputs), biexponential, self._n_inputs,
         )  # fmt: skip
 
     @classmethod
@@ -466,6 +483,7 @@ class Agent:
         weights: NDArray[np.float64],
         velocity: NDArray[np.float64],
         rule_memory: NDArray[np.float64],
+        weight_sum: NDArray[np.float64],
         trials: int,
         over: bool,
     ) -> None:
@@ -473,6 +491,7 @@ class Agent:
         self._weights[:] = weights
         self._velocity[:] = velocity
         self._rule_memory[:] = rule_memory
+        self._weight_sum[:] = weight_sum
         self._trials, self.overflowed = trials, over
 
     # --- checkpoints -----------------------------------------------------------------------------
@@ -517,6 +536,7 @@ class Agent:
         agent = self.rebuilt(model, self._rule, self._n_inputs, self._weight_bounds)
         agent.weights, agent.velocity = self._weights, self._velocity
         agent.rule_memory = self._rule_memory
+        agent.weight_sum = self._weight_sum
         agent.rng = copy.deepcopy(self.rng)
         agent._trials = self._trials
         return agent

@@ -98,6 +98,7 @@ class AgentBatch:
             overflow,
             self._blocks([[float(agent.trials)] for agent in self._agents]),
             self._blocks([agent.rule_memory for agent in self._agents]),
+            self._blocks([agent.weight_sum for agent in self._agents]),
             self._blocks([state_of(agent.rng) for agent in self._agents], np.uint64),
             first.rule.static(first.n_inputs),
         )
@@ -108,7 +109,7 @@ class AgentBatch:
         table: NDArray[Any] = np.array(rows, dtype)
         padding = -len(table) % self._width
         table = np.concatenate([table, np.repeat(table[-1:], padding, axis=0)])
-        blocks = table.reshape(-1, self._width, table.shape[1])
+        blocks = table.reshape(len(table) // self._width, self._width, table.shape[1])
         return np.ascontiguousarray(blocks.transpose(0, 2, 1))
 
     def _per_agent(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -169,17 +170,21 @@ class AgentBatch:
         weights = self._rows(self._models.weights)
         velocity = self._rows(self._learning.velocity)
         memory = self._rows(self._learning.memory)
+        weight_sum = self._rows(self._learning.weight_sum)
         generators = self._rows(self._learning.generators)
         overflowed = self.overflowed()
         for k, agent in enumerate(self._agents):
             heard = int(self._per_agent(self._learning.heard)[k]) + self._trials
             if agent.rng is not None:
                 put_state(agent.rng, generators[k])
-            agent._take(weights[k], velocity[k], memory[k], heard, bool(overflowed[k] >= 0))
+            agent._take(
+                weights[k], velocity[k], memory[k], weight_sum[k], heard, bool(overflowed[k] >= 0)
+            )
 
     def _rows(self, blocks: NDArray[Any]) -> NDArray[Any]:
         """(blocks, rows, width) -> one row per agent."""
-        return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: len(self._agents)]
+        rows = blocks.shape[0] * blocks.shape[2]
+        return blocks.transpose(0, 2, 1).reshape(rows, blocks.shape[1])[: len(self._agents)]
 
     def overflowed(self) -> NDArray[np.int64]:
         """Per agent the trial in which learning ended because a weight overflowed, or −1."""

@@ -46,7 +46,7 @@ def loops(model: Model, rule: Rule, width: int = 1) -> Any:
     return _loops(
         Key(
             label, advance, type(model), model.reads_V, model.readout_lag,
-            type(rule), rule.variant, rule.kernel(model).biexponential, width,
+            type(rule), rule.variant, rule.averages, rule.kernel(model).biexponential, width,
         )
     )  # fmt: skip
 
@@ -61,6 +61,7 @@ class Key(NamedTuple):
     lag: int
     rule: type[Rule]
     variant: tuple[str, bool]
+    averages: bool
     biexponential: bool
     width: int
 
@@ -70,6 +71,8 @@ class Key(NamedTuple):
         parts = [self.label, self.rule.name, "bi" if self.biexponential else "mono"]
         if self.variant != (self.rule.feedback, self.rule.learns_when_right):
             parts.append("_".join(map(str, self.variant)))
+        if self.averages:
+            parts.append("averaged")
         if not self.reads_V:
             parts.append(f"x{self.lag}")
         return "_".join(parts)
@@ -140,9 +143,11 @@ def _of_rule(key: Key) -> dict[str, Any]:
     whole_trial = rule.teach is not None or rule.change is not None
     needs_readout = whole_trial or rule.bin_signal is not None
     draws = rule.spike_probability is not None
+    # Rules that learn from every trial leave no lane out, and gain nothing by smaller parts.
+    every_trial = rule.weigh is not None or feedback in ("reward", "none")
     return {
         "WIDTH": key.width,
-        "LEARN_WIDTH": min(key.width, LEARN_WIDTH),
+        "LEARN_WIDTH": key.width if every_trial else min(key.width, LEARN_WIDTH),
         "USES_ERROR": rule.uses_error and feedback == "presentations",
         "USES_OUTPUT": whole_trial or rule.uses_output,
         "USES_READOUT": draws or (needs_readout and not key.reads_V),
@@ -152,6 +157,7 @@ def _of_rule(key: Key) -> dict[str, Any]:
         "SEES_PRESENTATIONS": feedback == "presentations",
         "TOLD_REWARD": feedback == "reward",
         "WEIGHS": rule.weigh is not None,
+        "AVERAGES": key.averages,
         "EXPLORES": draws,
         "BY_BIN": rule.bin_signal is not None or rule.side_by_side is not None,
         "OwnNumbers": rule.parameters_type,

@@ -17,8 +17,14 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.learning.rule import Outcome
-from agents.simd import any_lane, full, load, store, unpack, where
-from agents.training.slots import THRESHOLD, WIDTH, OwnNumbers, spike_probability
+from agents.simd import any_lane, full, lanes_of, load, next_lane, store, unpack, where
+from agents.training.slots import (
+    THRESHOLD,
+    USES_OUTPUT,
+    WIDTH,
+    OwnNumbers,
+    spike_probability,
+)
 from agents.training.stepwise import Heard
 from agents.training.trial import N_COMMON, ModelBlock, RuleBlock, TrialLog
 from gnm_env.compiled import compiled
@@ -94,6 +100,9 @@ def explore_trial_template(
     zero = full(0.0, WIDTH)
     own = unpack(OwnNumbers, rule.parameters[N_COMMON:], zero)
     threshold = load(model.parameters, THRESHOLD, zero)
+    # First all probabilities: among the branches of the second loop they would cost far more.
+    for t in range(trial.edges[len(trial.edges) - 1]):
+        store(log.readout, t, spike_probability(own, load(log.V, t, zero), threshold))
     bars = np.empty((1, WIDTH))
     for lane in range(WIDTH):
         bars[0, lane] = next_uniform(state, lane)
@@ -104,19 +113,22 @@ def explore_trial_template(
     for segment in range(len(trial.target)):
         given = zero
         for t in range(trial.edges[segment], trial.edges[segment + 1]):
-            probability = spike_probability(own, load(log.V, t, zero), threshold)
+            probability = load(log.readout, t, zero)
             silence = silence * (1.0 - probability)
             fires = silence <= bar
-            z = where(fires, 1.0, zero)
-            store(log.readout, t, probability)
-            store(log.output, t, z)
+            if USES_OUTPUT:
+                store(log.output, t, where(fires, 1.0, zero))
             if any_lane(fires):
-                for lane in range(WIDTH):
-                    if log.output[t, lane] != 0.0:
-                        bars[0, lane] = next_uniform(state, lane)
+                z = where(fires, 1.0, zero)
+                store(log.readout, t, probability - z)
+                given = given + z
+                left = lanes_of(fires)
+                while left != 0:
+                    lane = next_lane(left)
+                    bars[0, lane] = next_uniform(state, lane)
+                    left &= left - 1
                 bar = load(bars, 0, zero)
                 silence = where(fires, 1.0, silence)
-                given = given + z
         store(log.counts, segment, given)
         emitted = emitted + given
         owed += trial.target[segment]
@@ -126,7 +138,7 @@ def explore_trial_template(
 def explore_bin_template(
     rule: RuleBlock, model: ModelBlock, heard: Heard, t: int, silence: NDArray[np.float64]
 ) -> float:
-    """As `explore_trial`, one bin of one neuron: its output, noted in `heard` with its probability.
+    """As `explore_trial`, one bin of one neuron: its output z, and P − z, noted in `heard`.
 
     `silence` is (S, u): the probability Π(1 − P) that there would have been no spike since the last
     one, or since the trial began, and a uniform number. The spike comes in the first bin in which S
@@ -137,6 +149,6 @@ def explore_bin_template(
     probability = spike_probability(own, heard.V[t, 0], model.parameters[THRESHOLD, 0])
     silence[0] = silence[0] * (1.0 - probability)
     out = 1.0 if silence[0] <= silence[1] else 0.0
-    heard.readout[t, 0] = probability
+    heard.readout[t, 0] = probability - out
     heard.output[t, 0] = out
     return out

@@ -201,7 +201,9 @@ def lane_groups(agents: Sequence[Any], source: Source, threads: int) -> list[Any
             raise ValueError(
                 f"agents must be agents, such as NeuronAgent makes, got {agent!r} as agent {place}"
             )
-    n_weights = sum(np.size(getattr(agent, "weights", ())) for agent in agents)
+    n_weights = sum(
+        np.size(getattr(agent, name, ())) for agent in agents for name in ("weights", "weight_sum")
+    )
     require_memory(n_weights, len(agents), source, threads)
     kinds: dict[Hashable, list[int]] = defaultdict(list)
     for place, agent in enumerate(agents):

@@ -32,13 +32,15 @@ USES_ERROR = False
 USES_OUTPUT = False
 """Whether it is to hold the output of each bin."""
 USES_READOUT = False
-"""Whether it is to hold the readout, which is not V, or the probability of a spike."""
+"""Whether it is to hold the readout, which is not V, or what takes its place."""
 BIEXPONENTIAL = False
 SEES_PRESENTATIONS = False
 TOLD_REWARD = False
 """Whether the correction is the reward, less 1."""
 WEIGHS = False
 """Whether the rule has its own `weigh`."""
+AVERAGES = False
+"""Whether the rule averages weights over some of the trials."""
 EXPLORES = False
 """Whether the rule draws the output while it learns."""
 BY_BIN = False

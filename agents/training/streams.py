@@ -8,10 +8,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from agents.learning.averaging import average
 from agents.learning.rule import RuleParameters
 from agents.model import Arrays, Block
 from agents.simd import any_lane, full, load, pack, store, unpack, where
 from agents.training.slots import (
+    AVERAGES,
     EXPLORES,
     TOLD_REWARD,
     USES_ERROR,
@@ -70,6 +72,8 @@ class Learning(NamedTuple):
     """(blocks, 1, WIDTH); trials that each model had heard before."""
     memory: Block
     """(blocks, numbers, WIDTH); what the rule remembers from trial to trial."""
+    weight_sum: Block
+    """(blocks, weights, WIDTH) for rules that average, else (blocks, 0, WIDTH)."""
     generators: NDArray[np.uint64]
     """(blocks, 4, WIDTH); see `agents.training.exploration`."""
     static: tuple[int, ...]
@@ -154,6 +158,10 @@ def train_template(
                 taught = load(scratch.corrections, 0, zero) != 0.0
                 failed = taught & (load(scratch.finite, 0, zero) == 0.0)
                 overflowed_in = where(failed, float(first_trial + k), overflowed_in)
+            if AVERAGES:
+                number = where(overflowed_in < 0.0, heard + float(k + 1), zero)
+                shared = unpack(RuleParameters, learning.parameters[block], zero)
+                average(shared, number, model.arrays.weights, learning.weight_sum[block])
         store(learning.overflow[block], 0, overflowed_in)
         store(wrong[block], 0, n_wrong)
         store(absolute[block], 0, total_error)

@@ -43,8 +43,8 @@ class TrialLog(NamedTuple):
     output: Block
     """Output of each bin; kept only for rules that use it."""
     readout: Block
-    """X of each bin, kept only for rules that use it, where it is not V itself; or the probability
-    of a spike, for rules that draw them."""
+    """X of each bin, kept only for rules that use it, where it is not V itself; or, for rules that
+    draw spikes, the probability of one less the spike."""
     counts: Block
     """Output in each segment."""
 
@@ -222,4 +222,7 @@ def new_scratch(n_weights: int, width: int) -> Scratch:
 def rate_of(p: RuleParameters, rates: NDArray[np.float64]) -> RuleParameters:
     """`p` with the learning rates of the present trial."""
     rate = load(rates, 0, p.learning_rate)
-    return RuleParameters(rate, p.momentum, p.lowest, p.highest, p.slow, p.fast, p.scale, p.decay)
+    return RuleParameters(
+        rate, p.momentum, p.lowest, p.highest, p.slow, p.fast, p.scale, p.decay,
+        p.average_first, p.average_last,
+    )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,15 +12,20 @@ from numba import njit
 from numpy.typing import NDArray
 
 from agents.simd import (
+    WHOLE,
     any_lane,
     full,
+    lanes_of,
     like,
     load,
+    multiply_add,
     negated,
+    next_lane,
     pack,
     power,
     repeated,
     store,
+    times_two_to_the,
     unpack,
     where,
 )
@@ -179,3 +185,42 @@ def test_named_tuples_are_packed_and_unpacked_row_by_row_also_from_a_slice_of_la
     powers = [math.pow(x * x, y) for x, y in zip(part[0], exponents[0], strict=True)]
     assert np.array_equal(out[6, width:], powers)
     assert not out[:, :width].any()
+
+
+def _bits(width: int) -> Any:
+    @njit(error_model="numpy")
+    def run(block: NDArray[Any], out: NDArray[Any], lanes: NDArray[Any]) -> int:
+        zero = full(0.0, width)
+        x, y, z = load(block, 0, zero), load(block, 1, zero), load(block, 2, zero)
+        store(out, 0, multiply_add(x, y, z))
+        store(out, 1, multiply_add(x, 0.7, 3.0))
+        store(out, 2, times_two_to_the(x, load(block, 3, zero) + WHOLE))
+        left, found = lanes_of(y > z), 0
+        while left != 0:
+            lanes[found] = next_lane(left)
+            found += 1
+            left &= left - 1
+        return found
+
+    return run
+
+
+def test_a_product_and_sum_is_rounded_once_powers_of_two_are_exact_and_lanes_are_named(
+    width: int,
+) -> None:
+    run, rng = _bits(width), np.random.default_rng(5)
+    for _ in range(20):
+        block = rng.standard_normal((4, width))
+        block[2] = -block[0] * block[1] * (1.0 + 1e-16)  # what is left is rounding
+        block[3] = rng.integers(-60, 61, width)
+        out, lanes = np.empty((3, width)), np.empty(width, np.int64)
+        found = run(block, out, lanes)
+        x, y, z, n = ([Fraction(float(value)) for value in row] for row in block)
+        once = [float(a * b + c) for a, b, c in zip(x, y, z, strict=True)]
+        assert np.array_equal(out[0], once)
+        plain = [float(a * Fraction(0.7) + 3) for a in x]
+        assert np.array_equal(out[1], plain)
+        assert np.array_equal(
+            out[2], [math.ldexp(float(a), int(k)) for a, k in zip(x, n, strict=True)]
+        )
+        assert lanes[:found].tolist() == np.flatnonzero(block[1] > block[2]).tolist()

@@ -8,7 +8,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-NOT_OURS = ("_build", "tutorials/gallery", "environments/gnm-", "reproduction/", "findings/")
+NOT_OURS = (
+    "_build",
+    "tutorials/gallery",
+    "environments/gnm-",
+    "reproduction/",
+    "findings/",
+    "forensics/",
+)
 MARK = r"(?:<!-- (?P<mark>[a-z ]+): (?P<reason>[^>]+?) -->\n)?"
 BLOCK = re.compile(MARK + r"```(?P<language>\w+)\n(?P<code>.*?)^```", re.MULTILINE | re.DOTALL)
 

@@ -199,9 +199,10 @@ def test_a_row_that_there_is_not_is_refused_before_anything_is_trained(words, tm
 
 @pytest.mark.slow
 def test_a_search_and_its_league_run_from_end_to_end(tmp_path, monkeypatch):
-    for module in (tuning, ranking):
-        monkeypatch.setattr(module, "TRIALS", 300)
-        monkeypatch.setitem(module.SIZES, "quick", ((7,), (1,)))
+    monkeypatch.setattr(ranking, "TRIALS", 300)
+    monkeypatch.setitem(ranking.SIZES, "quick", ((7,), (1,)))
+    stages = (tuning.Stage((3,), 100, (1,)), tuning.Stage((4,), 300, (1,)))
+    monkeypatch.setitem(tuning.SIZES, "quick", stages)
     words = ["--tune", "--rules", "all", "--neurons", "GNM", "--out", tmp_path]
     told = command.main(parse(command, words))
     assert list(told["rules"]["GNM, ALL"]["1"]) == ["7"]

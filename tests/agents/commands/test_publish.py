@@ -124,3 +124,30 @@ def test_what_is_kept_stays_whole_if_a_store_is_missing(places: list[str], tmp_p
 
     assert {path: path.read_bytes() for path in tmp_path.glob("docs/**/*.*")} == kept
     assert [path.name for path in (tmp_path / "docs").iterdir()] == ["quick"]
+
+
+def test_forensics_have_a_folder_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "FORENSICS.png").write_text("png")
+    record = {
+        "size": "quick", "command": "gnm forensics --size quick", "work": "1 min",
+        "tried": {
+            "ways of training": 72, "protocols": 576, "ways that went on": 18,
+            "pattern seeds": {"coarse": "0", "fine": "1", "confirmed": "500–501"},
+        },
+        "numbers": [{"claim": "F3e", "words": "MST", "paper": "≈ 377", "low": 300, "high": 475}],
+        "protocols": [
+            {"label": "search 1", "name": "readout V", "points": "1.0", "back": 1,
+             "values": ["390"], "inside": [True]}
+        ],
+        "hypotheses": [], "unexplained": [], "search": [], "caption": "", "stores": [STORE],
+    }  # fmt: skip
+    (tmp_path / "forensics.json").write_text(json.dumps(record))
+    out = tmp_path / "docs"
+    run(["--forensics", "--report", str(tmp_path), "--out", str(out)])
+
+    text = (out / "quick" / "forensics.md").read_text()
+    assert "| search 1: readout V | 1.0 | 1 |" in text
+    assert "| F3e | MST | ≈ 377 | 300 … 475 | **390** |" in text
+    with pytest.raises(ValueError, match="one by one"):
+        run(["--forensics", "--findings"])

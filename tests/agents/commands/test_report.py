@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from agents.commands import check_report
 from agents.commands.terminal import parse
 from agents.experiments.listing import claims, pictures
-from agents.experiments.report import page, record, write
+from agents.experiments.report import page, record, shown_forensics, write
 from agents.experiments.store import Summary
 from tests.agents.experiments.worlds import as_in_the_paper, world
 
@@ -38,7 +39,7 @@ def test_every_claim_has_its_row_number_and_verdict(html: str) -> None:
     assert len(check_report.ids(html)) == len(claims())
     assert "MST ahead of GNM in 0 of 5" in html
     assert html.count("– missing") == len(claims()) - 5
-    assert "no data: F3, F3-published" in html
+    assert "no data: F3, F3-wide" in html
 
 
 def test_the_page_tells_size_rules_commands_and_cost(html: str) -> None:
@@ -58,8 +59,8 @@ def test_the_reference_table_stands_beside_the_prototype(html: str) -> None:
 def testminus_signs_areminus_signs() -> None:
     from agents.experiments.report import minus
 
-    assert minus("gain -12 [-20 … -3], F3-published, sub-threshold") == (
-        "gain −12 [−20 … −3], F3-published, sub-threshold"
+    assert minus("gain -12 [-20 … -3], F3-wide, sub-threshold") == (
+        "gain −12 [−20 … −3], F3-wide, sub-threshold"
     )
 
 
@@ -100,3 +101,40 @@ def test_the_page_opens_sorts_and_complains_of_nothing(html: str, tmp_path: Path
     path.write_text(html.replace("</body>", "<script>nothing.there()</script></body>"), "utf-8")
     with pytest.raises(ValueError, match=r"wrote to its console: .*nothing is not defined"):
         check_report.check(path, chromium)
+
+
+def test_what_the_forensics_found_is_shown_if_it_is_of_that_size(tmp_path: Path) -> None:
+    found = {
+        "size": "quick",
+        "tried": {
+            "ways of training": 72,
+            "protocols": 576,
+            "pattern seeds": {"coarse": "0", "fine": "1", "confirmed": "500–501"},
+        },
+        "numbers": [{}] * 17,
+        "protocols": [{"name": "authors, cap 1,000", "points": "11.6", "back": 10}],
+        "unexplained": ["α 0.08"],
+        "hypotheses": [{"words": "it explains", "verdict": "holds", "numbers": "+1"}],
+        "caption": "Each number.",
+    }
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "FORENSICS.svg").write_text("<svg></svg>")
+    (tmp_path / "forensics.json").write_text(json.dumps(found))
+    assert shown_forensics(tmp_path, "paper") is None
+    assert shown_forensics(tmp_path / "nowhere", "quick") is None
+
+    told = record(world(as_in_the_paper, ("F1",), 2), COSTS, "quick")
+    html = page(told, [], {}, shown_forensics(tmp_path, "quick"))
+    assert "authors, cap 1,000</td><td>11.6</td><td>10 of 17" in html
+    assert "under none of these: α 0.08." in html
+    assert "data:image/svg+xml;base64" in html
+
+
+def test_a_forest_plot_stands_beside_its_claim() -> None:
+    results = world(as_in_the_paper, ("CONDITIONS",), 4)
+    told = record(results, COSTS, "quick")
+    html = page(told, [], {"F7a+": "data:image/svg+xml,<svg></svg>"})
+    assert html.count('class="forest"') == 1
+    rows = {row["id"]: row["forest"] for row in told["claims"]}
+    assert rows["F7a+"]["paper"] == 0.06
+    assert rows["F7a"] is None

@@ -15,7 +15,7 @@ from agents.plotting import MAP, save, styled
 from tests.agents.experiments.worlds import as_in_the_paper, world
 
 PICTURES = pictures()
-SCORED = ("F1", "F3", "F3-published", "F4", "F5", "LINES", "F6", "F7", "BP", "table")
+SCORED = ("F1", "F3", "F3-wide", "F4", "F5", "LINES", "F6", "F7", "BP", "CONDITIONS", "table")
 
 
 @pytest.fixture(scope="module")

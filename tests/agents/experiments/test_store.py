@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import multiprocessing
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import xarray as xr
 
 from agents.experiments.design import Axis, Experiment
+from agents.experiments.former_names import current
 from agents.experiments.journal import DATA, JOURNAL, StoreError
 from agents.experiments.store import open_store, read, summarise
 from tests.agents.experiments.toys import toy, work
@@ -238,3 +240,44 @@ def test_a_full_disk_leaves_what_was_finished(
     assert summarise(folder).done == 2
     fill(folder, toy())
     read(folder)
+
+
+def as_formerly(experiment: Experiment) -> Experiment:
+    """The same experiment under the names that an earlier version gave."""
+    names = Axis("start", ("matched", "published"), chunk=0)
+    axes = (*experiment.axes[:2], names)
+    common = {**experiment.common, "start": "published", "alpha": 0.0}
+    return replace(experiment, name="F3-published", axes=axes, common=common)
+
+
+def test_a_store_with_former_names_is_read_and_goes_on_under_those_of_today(tmp_path: Path) -> None:
+    former = as_formerly(toy())
+    today = replace(
+        former,
+        name="F3-wide",
+        axes=(*former.axes[:2], Axis("start", ("matched", "wide"), chunk=0)),
+        common={**former.common, "start": "wide"},
+    )
+    fill(tmp_path / "F3-published", former, 1)
+    fill(tmp_path / "F3-wide", today)
+
+    results = read(tmp_path / "F3-wide")
+    assert not (tmp_path / "F3-wide").exists()
+    assert results["start"].to_numpy().tolist() == ["matched", "wide"]
+    assert results.attrs["settings"]["common"]["start"] == "wide"
+    assert int(results["survived"].sel(start="wide").min()) >= 0
+    assert summarise(tmp_path / "F3-wide").done == len(today.blocks())
+
+
+def test_former_names_are_no_others() -> None:
+    kept = ["GNM, ALL as published", "publisheds", "unpublished", 3, None]
+    assert current(kept) == kept
+    assert current({"published": ["published: GNM 0.3, ET", "GNM, ET, tuned λ, published"]}) == {
+        "wide": ["wide: GNM 0.3, ET", "GNM, ET, tuned λ, wide"]
+    }
+
+
+def test_an_axis_with_no_value_but_zero_is_no_damage(folder: Path) -> None:
+    fill(folder, toy(seeds=1))
+
+    assert read(folder)["pattern_seed"].to_numpy().tolist() == [0]

@@ -24,7 +24,7 @@ SHORT = {"trials": 300, "runs": 3, "cap": 400}
 
 
 def test_a_block_gives_each_neuron_what_it_gets_alone() -> None:
-    rows = {"GNM": GNM_ALL, "MST": MST_ALL, "GNM, published": {**GNM_ALL, "start": "published"}}
+    rows = {"GNM": GNM_ALL, "MST": MST_ALL, "GNM, wide": {**GNM_ALL, "start": "wide"}}
     axes = (class_counts(2), pattern_seeds((3,)), learners(rows))
     (block,) = training("toy", "", axes, keep_weights=True, **SHORT).blocks()
     values = training("toy", "", axes, keep_weights=True, **SHORT).compute(block)
@@ -62,10 +62,10 @@ def test_rows_of_the_table_are_the_neurons_that_they_name(name: str) -> None:
     assert ("modulated" in name) == bool(getattr(agent.rule, "modulate", False))
     assert getattr(agent.neuron, "refractory", 0) == (25 if "refractory 25" in name else 0)
     highest = {"gnm": (0.1, 0.3), "mst": (0.02, 0.2), "lif": (0.1, 0.5)}[agent.neuron.name]
-    assert agent.weights.max() == pytest.approx(highest["published" in name], rel=0.05)
+    assert agent.weights.max() == pytest.approx(highest["wide" in name], rel=0.05)
 
 
-def test_matched_and_published_rows_of_the_table_mirror_figure_7() -> None:
+def test_matched_and_wide_rows_of_the_table_mirror_figure_7() -> None:
     assert set(F7_LEARNERS) <= set(TABLE_LEARNERS)
 
 
@@ -99,7 +99,7 @@ def test_an_axis_is_checked_against_every_neuron_that_it_meets() -> None:
         (Axis("alpha", (0.3, 1.3)), {}, "alpha must be in 0 … 1, got 1.3"),
         (Axis("rate", (0.01, 2.0)), {}, "rate must be in 0 … 1, got 2.0"),
         (Axis("rate", (0.01, 0.02), chunk=0), {}, "axis rate must have chunk=1"),
-        (Axis("start", ("matched", "warm")), {}, "start must be matched or published"),
+        (Axis("start", ("matched", "warm")), {}, "start must be matched or wide"),
         (Axis("neuron", ("gnm", "gmn")), {}, "no neuron 'gmn'"),
         (Axis("runs", (10, 20)), {}, "runs cannot be set by an axis"),
         (Axis("trials", (0,)), {}, "trials must be >= 1, got 0"),
@@ -109,7 +109,7 @@ def test_an_axis_is_checked_against_every_neuron_that_it_meets() -> None:
         (Axis("alpha", (0.1,)), {"keep_weights": "no"}, "keep_weights must be True or False"),
         (Axis("classes", (1,)), {}, "an Axis with a name of its own, got classes, "),
         (3, {}, "an Axis with a name of its own, got 3"),
-        (Axis("alpha", (0.1,)), {"neuron": "continuous", "start": "published"}, "published init"),
+        (Axis("alpha", (0.1,)), {"neuron": "continuous", "start": "wide"}, "wide init"),
     ],
 )
 def test_values_out_of_range_are_refused_when_they_are_declared(

@@ -35,7 +35,7 @@ def test_the_tries_lie_where_the_search_says() -> None:
     assert all(0.06 <= one["alpha"] <= 0.4 for one in tried)
     assert all(0.9e-3 <= one["learning_rate"] <= 60e-3 for one in tried)
     assert {one["weight_bounds"] for one in tried} == {(0.0, 1.0), (-0.4, 0.4), None}
-    assert {one["start"] for one in tried} == {"matched", "published"}
+    assert {one["start"] for one in tried} == {"matched", "wide"}
     assert sum(one["falling"] for one in tried) > sum(not one["falling"] for one in tried)
     others = tuning.tries(tuning.entries()["MST, PeakError"])[1:]
     assert [one["learning_rate"] for one in others] == [one["learning_rate"] for one in tried]
@@ -80,13 +80,27 @@ def test_the_best_mean_keeps_its_settings_and_a_file_gives_them_back(tmp_path) -
     found = tuning.choose("LIF, MPDAL", made_up(scores))
     assert (found["try"], found["score"], found["usual"]) == (5, 900, 100)
     assert found["pattern_seeds"] == [0, 1] and found["classes"] == [2, 3]
+    kept = made_up(scores).isel({"try": [0, 3, 5]})
+    assert tuning.choose("LIF, MPDAL", kept) == found
     path = tmp_path / "settings.json"
     tuning.save_choices({"LIF, MPDAL": found}, path)
     tuning.save_choices({"GNM, ALL": found}, path)
-    kept = tuning.chosen_settings(path)
-    assert list(kept) == ["GNM, ALL", "LIF, MPDAL"]  # in the order of the grid
+    known = tuning.chosen_settings(path)
+    assert list(known) == ["GNM, ALL", "LIF, MPDAL"]  # in the order of the grid
     wanted = tuning.for_trials(tuning.tries(tuning.entries()["LIF, MPDAL"])[5], 9)
-    assert tuning.for_trials(kept["LIF, MPDAL"], 9) == wanted
+    assert tuning.for_trials(known["LIF, MPDAL"], 9) == wanted
+
+
+def test_the_first_stage_keeps_the_usual_settings_and_the_best_others() -> None:
+    scores = np.arange(tuning.TRIES) % 30
+    kept = tuning.kept_tries("GNM, PSD", made_up(scores))
+    assert kept == (0, *range(23, 30))
+    second = tuning.search("GNM, PSD", tuning.SIZES["full"][1], kept)
+    assert second.axes[2].values == kept and second.common["trials"] == 60_000
+    assert (
+        second.axes[2].setting(1)["learning_rate"]
+        == tuning.tries(tuning.entries()["GNM, PSD"])[23]["learning_rate"]
+    )
 
 
 def test_a_seed_that_is_not_finished_does_not_count() -> None:
@@ -101,11 +115,11 @@ def test_a_seed_that_is_not_finished_does_not_count() -> None:
 def test_the_search_hears_other_pattern_seeds_than_the_league() -> None:
     from agents.experiments.ranking import SIZES
 
-    for size, (seeds, _) in tuning.SIZES.items():
-        assert not set(seeds) & set(SIZES[size][0])
-        assert max(seeds) < 100 <= min(SIZES[size][0])
-    experiment = tuning.search("GNM, PSD", "full")
-    assert experiment.cells == 4 * 2 * tuning.TRIES
+    for size, (coarse, fine) in tuning.SIZES.items():
+        assert not set(coarse.seeds) & set(fine.seeds)
+        assert max(*coarse.seeds, *fine.seeds) < 100 <= min(SIZES[size][0])
+    experiment = tuning.search("GNM, PSD", tuning.SIZES["full"][0])
+    assert experiment.cells == 8 * 2 * tuning.TRIES
 
 
 def test_without_settings_it_says_how_to_make_them(tmp_path) -> None:
@@ -115,9 +129,9 @@ def test_without_settings_it_says_how_to_make_them(tmp_path) -> None:
 
 def test_the_settings_that_come_with_the_package_are_tries_of_the_search() -> None:
     known = json.loads(tuning.CHOSEN.read_text("utf-8"))
-    assert known["search"] == {"tries": tuning.TRIES, "trials": tuning.TRIALS}
+    assert known["search"] == {"tries": tuning.TRIES, "kept": tuning.KEPT}
     for name, found in known["chosen"].items():
         tried = tuning.tries(tuning.entries()[name])[found["try"]]
         assert tuning.for_trials(found["settings"], 7) == tuning.for_trials(tried, 7), name
-        assert found["pattern_seeds"] == [*tuning.SIZES["full"][0]]
+        assert found["pattern_seeds"] == [*tuning.SIZES["full"][1].seeds]
         assert found["score"] >= found["usual"]

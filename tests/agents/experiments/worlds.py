@@ -59,15 +59,17 @@ def world(score: Score, names: Sequence[str], seeds: int | None = None) -> dict[
 def _scored(name: str, score: Score, seeds: int | None) -> xr.Dataset:
     wanted = experiment(name, "quick", None if seeds is None else tuple(range(seeds)))
     runs = wanted.lengths["run"]
-    survived = np.empty((*wanted.shape, runs), np.int32)
+    further = wanted.variables[0].dims
+    lengths = [wanted.lengths[dim] for dim in further]
+    survived = np.empty((*wanted.shape, *lengths), np.int32)
     for block in wanted.blocks():
-        survived[block.region] = np.array(
-            [_runs(setting, score, runs) for setting in block.settings]
-        ).reshape(*block.shape, runs)
+        scored = np.array([_runs(setting, score, runs) for setting in block.settings])
+        scored = scored.reshape(*block.shape, *(1,) * (len(further) - 1), runs)
+        survived[block.region] = scored  # the same at every checkpoint, where there are some
     dims = [axis.name for axis in wanted.axes]
     coordinates = {axis.name: np.array(axis.values, _kind(axis.values)) for axis in wanted.axes}
     return xr.Dataset(
-        {"survived": ([*dims, "run"], survived)},
+        {"survived": ([*dims, *further], survived)},
         coordinates,
         {"settings": wanted.settings()},
     )

@@ -5,11 +5,20 @@ from __future__ import annotations
 import pytest
 
 from agents import noisy_performance, pretrained
+from agents.experiments import tuning
 from agents.trained import names, published_score
+from agents.trained.make import agent_name
 
 
 def test_there_are_agents_of_every_neuron() -> None:
-    assert {name.partition("-")[0] for name in names()} == {"gnm", "lif", "mst"}
+    assert {name.partition("-")[0] for name in names()} == {"gnm", "lif", "mst", "network"}
+
+
+def test_every_entry_of_the_league_that_learned_has_one_on_two_classes() -> None:
+    nothing_learned = {"stdp", "mstdpet"}
+    for entry in tuning.entries():
+        name = f"{agent_name(entry)}-2"
+        assert (name in names()) == (not nothing_learned & set(name.split("-"))), name
 
 
 @pytest.mark.parametrize("name", names())
