@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # --- the grids -----------------------------------------------------------------------------------
 
-SEEDS = {"quick": range(4), "paper": range(48)}
+SEEDS = {"quick": range(4), "paper": range(24)}
 COUNTS = {"quick": (1, 2, 3), "paper": (1, 2, 3, 4)}
 
 NEURONS = {
