@@ -14,7 +14,7 @@ RECENT = import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 WHOLE = import sys, pip; sys.exit(sys.version_info < (3, 11) or sys.prefix == sys.base_prefix)
 NEEDS = $(VENV)/.made pyproject.toml constraints.txt
 
-.PHONY: help train evaluate show explore test test-slow test-exhaustive test-checked campaign \
+.PHONY: help train train-rl evaluate show explore test test-slow test-exhaustive test-checked campaign \
 	format benchmark reproduce report-check league docs docs-open clean distclean
 
 help:  ## print this list
@@ -22,6 +22,9 @@ help:  ## print this list
 
 train: $(VENV)/.for-train  ## train a neuron, score it, save it and draw it
 	@$(RUN) scripts/train.py $(ARGS)
+
+train-rl: $(VENV)/.for-league  ## train a Stable-Baselines3 agent, score it and save it
+	@$(RUN) scripts/train_rl.py $(ARGS)
 
 evaluate: $(VENV)/.for-train  ## score a saved neuron: make evaluate ARGS=CHECKPOINT
 	@$(RUN) scripts/evaluate.py $(ARGS)

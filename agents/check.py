@@ -41,19 +41,29 @@ def check_neuron(neuron: Any) -> None:
 
 
 def check_rule(rule: Any, neuron: Any = None) -> None:
-    """Try `rule` on `neuron` (None: a GNM) as `check_neuron` does; returns if all is well."""
+    """Try `rule` on `neuron` (None: a GNM) as `check_neuron` does; returns if all is well.
+
+    Raises ValueError as that does, and if no weight changes in some dozens of trials.
+    """
     if not isinstance(rule, Rule):
-        raise ValueError(f"rule must be an instance of a class derived from Rule, got {rule!r}")
+        raise ValueError(f"rule must be an instance of a class derived from Rule, got {_got(rule)}")
     if neuron is not None:
         _require_neuron(neuron)
+    _check_teaching(GNM() if neuron is None else neuron, rule)
     _check_widths(GNM() if neuron is None else neuron, rule)
 
 
 def _require_neuron(neuron: Any) -> None:
     if not isinstance(neuron, Neuron):
         raise ValueError(
-            f"neuron must be an instance of a class derived from Neuron, got {shown(neuron)}"
+            f"neuron must be an instance of a class derived from Neuron, got {_got(neuron)}"
         )
+
+
+def _got(value: Any) -> str:
+    if isinstance(value, type):
+        return f"the class {value.__name__}; write {value.__name__}()"
+    return shown(value)
 
 
 def _check_parameters(neuron: Neuron) -> None:
@@ -84,17 +94,33 @@ def _check_rest(neuron: Neuron) -> None:
         )
 
 
+def _agents(neuron: Neuron, rule: Rule, n: int) -> list[Agent]:
+    weight = 3 * neuron.default_initial_weight
+    return [NeuronAgent(neuron, rule, _TASK.n_inputs, k, weight) for k in range(n)]
+
+
+def _alone(neuron: Neuron, rule: Rule, patterns: Patterns) -> Agent:
+    """One agent, trained by the standard loop."""
+    alone = _agents(neuron, rule, 1)[0]
+    train(alone, PatternTrialEnv(_TASK, patterns), _TRIALS, seed=1)
+    return alone
+
+
+def _check_teaching(neuron: Neuron, rule: Rule) -> None:
+    before = _agents(neuron, rule, 1)[0].weights
+    if np.array_equal(_alone(neuron, rule, Patterns.draw(_TASK, 0)).weights, before):
+        raise ValueError(
+            f"{shown(rule)} changed no weight in {_TRIALS} trials: a teaching signal that is 0 "
+            "throughout teaches nothing, and so does a learning rate of 0; teach(p, trial, y) must "
+            "write into y, what it returns is not read"
+        )
+
+
 def _check_widths(neuron: Neuron, rule: Rule) -> None:
     patterns = Patterns.draw(_TASK, 0)
-
-    def agents(n: int) -> list[Agent]:
-        weight = 3 * neuron.default_initial_weight
-        return [NeuronAgent(neuron, rule, _TASK.n_inputs, k, weight) for k in range(n)]
-
-    alone = agents(1)[0]
-    train(alone, PatternTrialEnv(_TASK, patterns), _TRIALS, seed=1)
+    alone = _alone(neuron, rule, patterns)
     for width in WIDTHS:
-        group = agents(width)
+        group = _agents(neuron, rule, width)
         train_many(group, _TASK, patterns, _TRIALS, seed=1, threads=1)
         same = np.array_equal(group[0].weights, alone.weights, equal_nan=True)
         if not same:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from agents import registry
 from agents.learning.rule import NoMemory
-from gnm_env.checks import generator, whole
+from gnm_env.checks import brief, generator, whole
 from gnm_env.files import ArraySpec, atomic_write, open_arrays, write_arrays
 from gnm_env.task import Patterns, Task, task_arrays
 
@@ -65,6 +65,10 @@ class Checkpoint:
     task: Task | None = None
     patterns: Patterns | None = None
     rng: Generator | None = None
+
+    def __repr__(self) -> str:
+        task = "no task" if self.task is None else brief(self.task)
+        return f"Checkpoint({self.agent!r}, {task})"
 
 
 def save_agent(

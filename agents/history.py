@@ -19,7 +19,7 @@ BLOCK = 1_000
 """Trials per entry of a learning curve, unless told otherwise."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class History:
     """Learning curve of one agent, or of many. B is the number of blocks.
 
@@ -55,6 +55,16 @@ class History:
 
     def __len__(self) -> int:
         return len(self.trials)
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "History(no trials yet)"
+        agents = self.error_rate[-1].size
+        return (
+            f"History({self.trials[-1]:,} trials in {len(self):,} blocks, "
+            f"{agents:,} agent{'s' * (agents != 1)}: "
+            f"{self.error_rate[-1].mean():.1%} of the trials wrong in the last block)"
+        )
 
     def of(self, agent: int) -> History:
         """The learning curve of one agent of `train_many`; negative numbers count from the end.

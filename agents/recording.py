@@ -12,7 +12,7 @@ from gnm_env.checks import shown
 from gnm_env.trial import Trial
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Variables of a neuron in each of the T bins of a trial; all arrays have shape (T,).
 
@@ -30,6 +30,10 @@ class Recording:
     R: NDArray[np.float64]
     X: NDArray[np.float64]
     spikes: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        given = int(self.spikes.sum())
+        return f"Recording({len(self.V):,} bins, {given:,} output spike{'s' * (given != 1)})"
 
 
 def record(agent: Any, trial: Trial) -> Recording:

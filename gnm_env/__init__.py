@@ -1,12 +1,14 @@
 """Spike patterns hidden in noise, as Gymnasium environments with the aggregate label as feedback.
 
 Importing this package registers `gnm/PatternTrial-v0`, `gnm/PatternStream-v0`, and both for every
-level of `suite()`.
+level of `suite()`. If the module `agents` on the path is another project's, a
+warning says so.
 """
 
 from gymnasium.envs.registration import register
 
 from gnm_env.levels import Level, register_levels, suite
+from gnm_env.neighbour import warn_of_foreign_agents
 from gnm_env.rules import MAX_EPISODE_BINS
 from gnm_env.stream_task.env import PatternStreamEnv
 from gnm_env.task import Patterns, Task
@@ -41,3 +43,4 @@ register(
     max_episode_steps=MAX_EPISODE_BINS,
 )
 register_levels()
+warn_of_foreign_agents()

@@ -6,6 +6,7 @@ the memory is there. Inside, nobody checks again.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import numbers
 import operator
@@ -45,6 +46,18 @@ def shown(value: Any) -> str:
     except Exception:  # an int of thousands of digits, an object with a broken repr
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:76]} …"
+
+
+def brief(record: Any) -> str:
+    """A dataclass by the fields that are not at their defaults: `GNM(alpha=0.1)`; else its repr."""
+    if not dataclasses.is_dataclass(record) or isinstance(record, type):
+        return repr(record)
+    told = [
+        f"{field.name}={value}"
+        for field in dataclasses.fields(record)
+        if field.repr and (value := repr(getattr(record, field.name))) != repr(field.default)
+    ]
+    return f"{type(record).__name__}({', '.join(told)})"
 
 
 def whole(name: str, value: Any, low: int, high: int | None = None) -> int:

@@ -42,6 +42,13 @@ VERBS = {
     "check-report": "open the report in headless Chromium and look for errors",
 }
 
+EXTRAS = {
+    "chemistry": ("chemistry", "reproduce"),
+    "league": ("reproduce", "rl"),
+    "reproduce": ("chemistry", "reproduce"),
+}
+"""What a verb needs of extras, where it is more than one: they are named together."""
+
 
 def main(words: Sequence[str] | None = None) -> None:
     """Run `gnm` with the given command line, by default that of the process, and end it."""
@@ -72,4 +79,5 @@ def run(verb: str, words: Sequence[str] | None = None, name: str | None = None) 
         lambda: importlib.import_module(f"agents.commands.{verb.replace('-', '_')}"),
         sys.argv[1:] if words is None else list(words),
         name or Path(sys.argv[0]).name,
+        EXTRAS.get(verb, ()),
     )

@@ -13,6 +13,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
 
+from gymnasium.error import DependencyNotInstalled
+
 RESULTS = Path("results")
 REPORT = RESULTS / "report"
 EVALUATION_SEED = 1_000_000
@@ -186,8 +188,10 @@ def parse(module: ModuleType, words: Sequence[object]) -> argparse.Namespace:
 # --- running a verb ------------------------------------------------------------------------------
 
 
-def run(find: Callable[[], ModuleType], words: Sequence[str], name: str) -> NoReturn:
-    """Find the module of a verb, parse, run and end the process.
+def run(
+    find: Callable[[], ModuleType], words: Sequence[str], name: str, extras: Sequence[str] = ()
+) -> NoReturn:
+    """Find the module of a verb, parse, run and end the process. `extras`: what the verb needs.
 
     Bad input, a full disk, a missing package and the like end with exit code 2 and one line; Ctrl-C
     and SIGTERM with 130 and a line on what was kept; results that say what failed with 1.
@@ -197,7 +201,7 @@ def run(find: Callable[[], ModuleType], words: Sequence[str], name: str) -> NoRe
             stream.reconfigure(errors="replace")
     os.environ.setdefault("MPLBACKEND", "Agg")  # pictures are files here, not windows
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with _told(name, words):
+    with _told(name, words, extras):
         module = find()
         options = parser(module, name, words).parse_args(words)
         with _resumable(module):
@@ -221,15 +225,18 @@ def _resumable(module: ModuleType) -> Iterator[None]:
 
 
 @contextmanager
-def _told(name: str, words: Sequence[str]) -> Iterator[None]:
+def _told(name: str, words: Sequence[str], extras: Sequence[str]) -> Iterator[None]:
     """End the process with one line on whatever a user can do something about."""
     try:
         yield
     except ModuleNotFoundError as error:
         extra = EXTRAS.get((error.name or "").partition(".")[0])
-        remedy = f': pip install "gnm-env[{extra}]"' if extra else ""
+        wanted = ",".join(sorted({extra, *extras})) if extra else ""
+        remedy = f': pip install "gnm-env[{wanted}]"' if wanted else ""
         _leave(2, f"{name}: {error.name} is not installed{remedy}")
-    except (ValueError, OSError, ImportError, MemoryError, OverflowError) as error:
+    except (
+        ValueError, OSError, ImportError, MemoryError, OverflowError, DependencyNotInstalled,
+    ) as error:  # fmt: skip
         _leave(2, f"{name}: {' '.join(str(error).split()) or type(error).__name__}")
     except KeyboardInterrupt as stop:
         if isinstance(stop, Stopped) and "--json" in words:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from agents import bootstrap_interval
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 RESAMPLES = 2_000
 

@@ -238,6 +238,12 @@ class Rule(ABC):
         return {**cls._compiled, "weight_change": cls.weight_change}
 
     def __post_init__(self) -> None:
+        for name in ("learning_rate", "momentum"):
+            if not hasattr(self, name):
+                raise ValueError(
+                    f"{type(self).__name__} needs the fields learning_rate and momentum, and has "
+                    f"no {name}: write, for one, `{name}: float = 0.01`"
+                )
         real("learning_rate", self.learning_rate, low=0.0)
         real("momentum", self.momentum, low=0.0, high=1.0)
         if self.trace_decay is not None:

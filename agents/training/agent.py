@@ -9,7 +9,6 @@ from dataclasses import fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numba.core.errors import NumbaError
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,13 +19,13 @@ from agents.model import Arrays, Model
 from agents.recording import Recording
 from agents.training.batch import AgentBatch
 from agents.training.binding import loops, recorder
-from agents.training.compile_errors import explained
+from agents.training.compile_errors import COMPILING, explained
 from agents.training.source import Source
 from agents.training.stepwise import Heard
 from agents.training.streams import WRONG_BEYOND
 from agents.training.told import Told, segments_told, whole_trial
 from agents.training.trial import ModelBlock, RuleBlock
-from gnm_env.checks import real, shown, whole
+from gnm_env.checks import brief, real, shown, whole
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial
 
@@ -147,7 +146,8 @@ class Agent:
             place[: len(part)] = part
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self._model!r}, {self._rule!r}, n_inputs={self._n_inputs})"
+        parts = f"{brief(self._model)}, {brief(self._rule)}, n_inputs={self._n_inputs}"
+        return f"{type(self).__name__}({parts})"
 
     # --- what it is made of ----------------------------------------------------------------------
 
@@ -279,7 +279,7 @@ class Agent:
         assert self._heard is not None
         try:
             out: float = self._loops.step(self._block, self._state, row, self._bin, self._heard)
-        except NumbaError as error:
+        except COMPILING as error:
             raise explained(error, self._model) from None
         if out < 0.0:
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
@@ -329,7 +329,7 @@ class Agent:
             outcome = self._loops.update(
                 self._rule_block, self._block, trial, self._heard, told.told, told.label, rate
             )
-        except NumbaError as error:
+        except COMPILING as error:
             raise explained(error, self._model, self._rule) from None
         self.overflowed = outcome < 0
         if self._rule.averages and not self.overflowed:
@@ -441,7 +441,7 @@ class Agent:
         block = ModelBlock(self._block.parameters, arrays, self._block.static, self._block.n_notes)
         try:
             values, given, memory = recorder(self._model)(block, trial.arrays)
-        except NumbaError as error:
+        except COMPILING as error:
             raise explained(error, self._model) from None
         return self._recording(values, given, memory)
 

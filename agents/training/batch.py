@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from agents.training.binding import loops
-from agents.training.compile_errors import explained
+from agents.training.compile_errors import COMPILING, explained
 from agents.training.exploration import put_state, state_of
 from agents.training.source import Source
 from agents.training.streams import MOST_SPIKES, Learning, Models, Tally
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 Rows = Sequence[Sequence[float] | NDArray[np.float64]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Answers:
     """Responses of several agents to the same trials, learning off.
 
@@ -44,6 +43,13 @@ class Answers:
     wrong: NDArray[np.int64]
     absolute: NDArray[np.float64]
     trials: int
+
+    def __repr__(self) -> str:
+        wrong = ", ".join(f"{one:,}" for one in self.wrong[:5]) + ", …" * (len(self.wrong) > 5)
+        return (
+            f"Answers(of {len(self.wrong):,} agent{'s' * (len(self.wrong) != 1)} to "
+            f"{self.trials:,} trials, {wrong} of them wrong)"
+        )
 
 
 def width_for(agents: int, widest: int) -> int:
@@ -124,7 +130,7 @@ class AgentBatch:
                     batch, drawn, longest, self._models, self._learning, self._trials + done,
                     wrong, absolute,
                 )  # fmt: skip
-            except NumbaError as error:
+            except COMPILING as error:
                 raise explained(error, self._agents[0].model, self._agents[0].rule) from None
         self._trials += trials
         return self._per_agent(wrong).astype(np.int64), self._per_agent(absolute)
@@ -137,7 +143,7 @@ class AgentBatch:
         """Bins that each agent survives on the endless stream of `rng`, at most `cap`."""
         try:
             bins = self._loops.survive(rng, self._source.stream(), cap, self._models)
-        except NumbaError as error:
+        except COMPILING as error:
             raise explained(error, self._agents[0].model) from None
         return self._per_agent(bins).astype(np.int64)
 

@@ -7,12 +7,37 @@ import re
 from pathlib import Path
 from typing import Any
 
+from numba.core.errors import NumbaError
+
+from agents.learning.teaching import HeardTrial
+
+COMPILING = (NumbaError, NotImplementedError)
+"""What numba raises where it cannot compile a function."""
+
 _OURS = Path(__file__).resolve().parent.parent
 _PLACE = re.compile(r'File "([^"]+)", line (\d+)')
 _REASONS = (
     (r"function truth", "a condition of many neurons has no one truth value"),
     (r"Cannot unify .* for '(\w+)[.\d]*'", "the name {0} has values of two kinds"),
+    (
+        r"Unknown attribute '(\w+)' of type HeardTrial",
+        f"a trial has no {{0}}; it has {', '.join(HeardTrial._fields)}",
+    ),
+    (
+        r"Unknown attribute '(\w+)' of type Parameters",
+        "there is no parameter {0}; parameters are the numeric fields of the class",
+    ),
+    (
+        r"response\.\w+",
+        "a step returns its new state and a Response(V, D, R, X, above, spike)",
+    ),
     (r"Unknown attribute '(\w+)'", "there is no {0}"),
+    (
+        r"No definition for lowering (\w+)\(.*\)\.(\w+) =",
+        "nothing can be written into a {0}; make a new one, {0}({1}=…)",
+    ),
+    (r">>> (max|min)imum\(", "{0}imum is for arrays; write {0}(a, b)"),
+    (r">>> where\(", "where is for arrays; write new if condition else x"),
     (r"name '(\w+)' is not defined", "the name {0} is not known"),
     (r"Untyped global name '(\w+)'", "{0} is not compiled: decorate it with gnm_env.compiled"),
     (r">>> ([\w.]+)\(", "{0} does not take what it is given here"),
@@ -36,7 +61,8 @@ def explained(error: Exception, *parts: Any) -> ValueError:
             break
     found = ((re.search(pattern, text), words) for pattern, words in _REASONS)
     reasons = (words.format(*match.groups()) for match, words in found if match)
-    reason = next(reasons, next(line for line in text.splitlines() if "Failed in" not in line))
+    said = (line for line in text.splitlines() if "Failed in" not in line)
+    reason = next(reasons, next(said, type(error).__name__))
     names = ", ".join(type(part).__name__ for part in parts)
     return ValueError(
         f"{names}: {where} cannot be compiled for neurons side by side: {reason}; "

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -118,3 +121,17 @@ def test_the_command_shows_a_saved_agent(tmp_path: Path) -> None:
     words = [str(tmp_path / "agent.npz"), "--to", str(tmp_path / "a.gif"), "--bins", "20"]
     assert watch.main(parse(watch, words))["bins"] == 20
     assert (tmp_path / "a.gif").exists()
+
+
+def test_without_pygame_the_command_names_the_extra_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "pygame.py").write_text("raise ModuleNotFoundError(name='pygame')")
+    root = Path(__file__).parents[2]
+    saved = root / "agents" / "trained" / "gnm-all-1.npz"
+    ended = subprocess.run(
+        [sys.executable, "-m", "agents.commands", "watch", str(saved)],
+        capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(root)])},
+    )  # fmt: skip
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line == 'gnm watch: render_mode="human" needs pygame: pip install "gnm-env[rendering]"'

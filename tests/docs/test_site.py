@@ -139,3 +139,31 @@ def test_pictures_say_what_they_show(site: Path) -> None:
         if not re.search(r'alt="[^"]+"', tag) and "_thumb.png" not in tag  # beside its title
     ]
     assert silent == []
+
+
+def test_no_page_is_wider_than_the_screen_and_every_picture_shows(site: Path) -> None:
+    """On a phone and on a laptop: tables and code scroll in their frames, not the page."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    from agents.commands.check_report import browser
+
+    if browser() is None:
+        pytest.skip("Chromium is not installed")
+    measure = """() => [
+        document.documentElement.scrollWidth,
+        [...document.images].filter(one => one.complete && !one.naturalWidth).length,
+    ]"""
+    pages = [page for page in site.rglob("*.html") if "_modules" not in page.parts]
+    wrong = {}
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=browser(), args=["--no-sandbox"])
+        screen = chromium.new_page()
+        for page in pages:
+            screen.goto(page.as_uri())
+            for width in (390, 1280):
+                screen.set_viewport_size({"width": width, "height": 844})
+                found = screen.evaluate(measure)
+                if found != [width, 0]:
+                    wrong[page.relative_to(site).as_posix(), width] = found
+        chromium.close()
+    assert len(pages) > 40
+    assert wrong == {}

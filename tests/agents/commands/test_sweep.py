@@ -194,16 +194,22 @@ def test_a_script_ends_with_one_json_object_and_a_line_of_progress(tmp_path: Pat
     assert read(tmp_path / "results" / "quick" / "F1").sizes["bin"] == 200
 
 
-def test_without_an_extra_a_script_says_in_one_line_which(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("script", "words", "extras"),
+    [("sweep.py", ["F1"], "reproduce"), ("reproduce.py", [], "chemistry,reproduce")],
+)
+def test_without_an_extra_a_script_says_in_one_line_which(
+    tmp_path: Path, script: str, words: list[str], extras: str
+) -> None:
     (tmp_path / "zarr.py").write_text("raise ModuleNotFoundError(name='zarr')")
     ended = subprocess.run(
-        [sys.executable, str(ROOT / "scripts" / "sweep.py"), "F1"],
+        [sys.executable, str(ROOT / "scripts" / script), *words],
         capture_output=True, text=True, timeout=600, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
     )  # fmt: skip
 
     assert ended.returncode == 2
-    assert ended.stderr == 'sweep.py: zarr is not installed: pip install "gnm-env[reproduce]"\n'
+    assert ended.stderr == f'{script}: zarr is not installed: pip install "gnm-env[{extras}]"\n'
 
 
 @pytest.fixture

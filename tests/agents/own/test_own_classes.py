@@ -109,6 +109,64 @@ def test_rules_that_are_well_pass_the_check(rule: Any) -> None:
     check_rule(rule)
 
 
+def returned(p: Any, trial: Any, y: Any) -> Any:
+    return trial.error * trial.V
+
+
+def misread(p: Any, trial: Any, y: Any) -> None:
+    y[0] = trial.sign
+
+
+@dataclass(frozen=True)
+class Returned(Rule):
+    """Returns what it should have written."""
+
+    learning_rate: float = 0.01
+    momentum: float = 0.0
+
+    name: ClassVar[str] = "returned"
+    feedback: ClassVar[str] = "sign"
+    teach: ClassVar[Any] = returned
+
+
+@dataclass(frozen=True)
+class Misread(Rule):
+    """Asks a trial for what it does not have."""
+
+    learning_rate: float = 0.01
+    momentum: float = 0.0
+
+    name: ClassVar[str] = "misread"
+    feedback: ClassVar[str] = "sign"
+    teach: ClassVar[Any] = misread
+
+
+@dataclass(frozen=True)
+class Rateless(Rule):
+    """Forgets what every rule has."""
+
+    name: ClassVar[str] = "rateless"
+    feedback: ClassVar[str] = "sign"
+    teach: ClassVar[Any] = returned
+
+
+def test_a_rule_without_a_learning_rate_is_told_to_have_one() -> None:
+    with pytest.raises(ValueError, match="Rateless needs the fields learning_rate and momentum"):
+        Rateless()
+
+
+@pytest.mark.parametrize(
+    ("rule", "told"),
+    [
+        (Returned(), "must write into y, what it returns is not read"),
+        (Misread(), "a trial has no sign; it has V, X, spikes, .* error, thresh"),
+    ],
+)
+def test_a_rule_that_teaches_nothing_or_misreads_its_trial_is_told(rule: Any, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        check_rule(rule)
+
+
 def test_a_class_that_keeps_its_parents_name_is_refused_when_it_is_defined() -> None:
     with pytest.raises(ValueError, match="Mine has its own step but keeps the name 'lif'"):
 
@@ -187,6 +245,36 @@ class Restless(Neuron):
 def test_what_cannot_be_compiled_is_told_in_one_sentence_with_its_line() -> None:
     with pytest.raises(ValueError, match=r"Broken.*line \d+, `V = np.floor") as refusal:
         check_neuron(Broken())
+    assert "\n" not in str(refusal.value)
+
+
+def writes_into_its_state(p: Any, static: Any, state: Any, current: Any) -> Any:
+    state.V += current
+    return state, Response(state.V, 0.0, 0.0, state.V, state.V >= p.theta, state.V >= p.theta)
+
+
+def returns_a_spike_alone(p: Any, static: Any, state: Any, current: Any) -> Any:
+    V = (1.0 - p.alpha) * state.V + current
+    return type(state)(V, state.raised), V >= p.theta
+
+
+def asks_for_what_is_no_field(p: Any, static: Any, state: Any, current: Any) -> Any:
+    V = (1.0 - p.leak) * state.V + current
+    return type(state)(V, state.raised), Response(V, V, V, V, V >= p.theta, V >= p.theta)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "told"),
+    [
+        (writes_into_its_state, r"nothing can be written into a State; make a new one, State\(V="),
+        (returns_a_spike_alone, r"a step returns its new state and a Response\(V, D, R, X, above"),
+        (asks_for_what_is_no_field, "there is no parameter leak; parameters are the numeric field"),
+    ],
+)
+def test_the_commonest_mistakes_in_a_step_are_told(mistake: Any, told: str) -> None:
+    body = {"name": f"mistake-{mistake.__name__}", "step": mistake, "__module__": __name__}
+    with pytest.raises(ValueError, match=told) as refusal:
+        check_neuron(dataclass(frozen=True)(type("Mistaken", (ALIF,), body))())
     assert "\n" not in str(refusal.value)
 
 
