@@ -119,6 +119,11 @@ def test_every_block_trains_and_is_scored(name: str) -> None:
     assert made["survived"].shape == (*block.shape, 100)
 
 
+def test_the_gain_of_spiking_is_drawn_for_both_readouts() -> None:
+    figure = discussion.PICTURES["D6"].draw(world(lambda s: 1_000.0, ("SPIKINESS",), 4))
+    assert len(figure.axes) == 2
+
+
 def test_the_figure_has_three_panels() -> None:
     data = world(lambda s: 1_000.0, ("NEURONS", "TIMES"), 4)
     figure = discussion.PICTURES["D"].draw({**data, **momentum_world(lambda name: 0.2)})
