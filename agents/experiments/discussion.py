@@ -462,7 +462,7 @@ PICTURES = {
         _draw_spikiness,
         ("SPIKINESS",),
         "What the best cell with η > 0 gains over the best one with η = 0, by number of classes "
-        "and readout; cells are chosen on every other pattern seed and compared on the rest. Means of "
-        "the paired differences with 95 % intervals; red where the gain is sure.",
+        "and readout; cells are chosen on every other pattern seed and compared on the rest. Means "
+        "of the paired differences with 95 % intervals; red where the gain is sure.",
     ),
 }
