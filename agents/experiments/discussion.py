@@ -238,18 +238,19 @@ def _judge_lif_worse(results: Results) -> Finding:
     data, held, numbers = results["NEURONS"], {}, []
     for start in STARTS:
         for refractory in (0, 10, 25):
-            worse = []
-            for classes in _counts(data):
-                if classes == 1:
-                    continue
-                lif = _scores(data, classes, start, f"LIF {refractory}")
-                for other in ("MST", "GNM"):
-                    ratio = _ratio(lif, _scores(data, classes, start, other))
-                    worse.append(ratio.below(1.0))
-                    numbers.append(
-                        f"{start}, refractory {refractory}, {CLASS_NAMES[classes]}: LIF / {other} "
-                        f"{ratio:.2f}"
+            worse, words = [], []
+            for other in ("MST", "GNM"):
+                ratios = [
+                    _ratio(
+                        _scores(data, classes, start, f"LIF {refractory}"),
+                        _scores(data, classes, start, other),
                     )
+                    for classes in _counts(data)
+                    if classes > 1
+                ]
+                worse += [ratio.below(1.0) for ratio in ratios]
+                words.append(f"LIF / {other} " + ", ".join(f"{ratio:.2f}" for ratio in ratios))
+            numbers.append(f"{start}, refractory {refractory}, two classes on: {'; '.join(words)}")
             held[f"the start is {start} and the refractory period {refractory}"] = all(worse)
     return Finding(all(held.values()), held, tuple(numbers))
 

@@ -135,7 +135,7 @@ def _judge_balance(results: Results) -> Finding:
         f"D takes more than there is in {cells.sum()} of {cells.size} cells of the grid",
         f"where ηγR + (1−η)α stays at most 1: {np.sum(created & within)} of {within.sum()} runs; "
         f"where it does not: {np.sum(created & ~within)} of {np.sum(~within)}",
-        f"at worst it takes {data['overdraft'].max():.2f} too much",
+        f"at worst it takes {float(data['overdraft'].max()):.2g} too much: V oscillates and grows",
     )
     kept = {"ηγR + (1−η)α never exceeds 1": not np.any(created & within)}
     return Finding(not created.any(), kept, numbers)
