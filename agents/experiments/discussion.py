@@ -418,7 +418,9 @@ def _draw_reasons(axes: Any, data: xr.Dataset) -> None:
                 mfc=fill, label=f"{start}, {'reset' if refractory == 0 else '+ 25 bins'}",
             )  # fmt: skip
     axes.axhline(1.0, color=INK, lw=0.8, ls="--")
-    axes.set(yscale="log", xlabel="classes", ylabel="LIF / no reset", xticks=counts)
+    axes.set(
+        yscale="log", xlabel="classes", ylabel="LIF / no reset", xticks=counts, ylim=(0.006, 5.0)
+    )  # room for the legend
     axes.legend(loc="lower left", fontsize=6)
     letter(axes, "c")
 

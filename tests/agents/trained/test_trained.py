@@ -15,10 +15,10 @@ def test_there_are_agents_of_every_neuron() -> None:
 
 
 def test_every_entry_of_the_league_that_learned_has_one_on_two_classes() -> None:
-    nothing_learned = {"stdp", "mstdpet"}
+    hardly_learns = {"stdp", "mstdpet"}
     for entry in tuning.entries():
         name = f"{agent_name(entry)}-2"
-        assert (name in names()) == (not nothing_learned & set(name.split("-"))), name
+        assert name in names() or hardly_learns & set(name.split("-")), name
 
 
 @pytest.mark.parametrize("name", names())
