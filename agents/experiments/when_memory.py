@@ -62,10 +62,10 @@ SITUATIONS: dict[str, dict[str, Any]] = {
 """A wanted pattern owed one spike, alone or with a second one that is owed none."""
 
 FAMILIES = {
-    "second pattern, owed none": (
+    "a second pattern": (
         PLAIN, "another", "overlap 50 %", "overlap 80 %", "overlap 90 %", "backwards",
     ),
-    "spikes moved by up to … bins": (PLAIN, "jitter 1", "jitter 2", "jitter 4", "jitter 8"),
+    "spikes moved by bins": (PLAIN, "jitter 1", "jitter 2", "jitter 4", "jitter 8"),
     "spikes left out": (PLAIN, "deletion 10 %", "deletion 20 %", "deletion 40 %"),
 }  # fmt: skip
 """In the order of difficulty, each from the plain task on."""
@@ -340,7 +340,10 @@ _STYLES = {
 
 
 def _short(situation: str) -> str:
-    return situation.replace("overlap", "shares").replace(" ", "\n", 1).removeprefix("jitter\n")
+    """A situation as the label of a tick."""
+    for word, short in (("overlap", "shares"), ("jitter ", ""), ("deletion ", "")):
+        situation = situation.replace(word, short)
+    return situation.replace("shares ", "shares\n").replace("backwards", "back-\nwards")
 
 
 def _draw(results: Results) -> Figure:
