@@ -4,6 +4,7 @@
     gnm publish --size quick --stores
     gnm publish --findings --size paper    what gnm findings found, in docs/findings
     gnm publish --forensics --size paper   what gnm forensics found, in docs/forensics
+    gnm publish --size paper --merge       only what was judged anew; all else stays
 
 Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, and with
 --stores one zip per experiment. Unpacked into results/SIZE/NAME, it is the store that it was.
@@ -26,6 +27,7 @@ from agents.commands.terminal import REPORT, RESULTS, Parser, share
 from agents.experiments import forensics_page
 from agents.experiments.former_names import standing
 from agents.experiments.store import read
+from agents.experiments.verdict import MISSING
 
 KEPT = ("png", "pdf")
 
@@ -53,6 +55,11 @@ def options(parser: Parser) -> None:
         "--forensics", action="store_true", help="keep what explains the paper's numbers best"
     )
     parser.add_argument("--stores", action="store_true", help="keep the stores too")
+    parser.add_argument(
+        "--merge",
+        action="store_true",
+        help="leave what the report says nothing of (verdict “missing”) as it is kept",
+    )
     share(parser, "--results")
     parser.add_argument(
         "--report",
@@ -67,19 +74,29 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     """Replace what is kept of one size."""
     if options.findings and options.forensics:
         raise ValueError("--findings and --forensics are kept one by one: leave one out")
+    if options.merge and options.forensics:
+        raise ValueError("the forensics are one whole: leave --merge out")
     kind = FOUND if options.findings else SOUGHT if options.forensics else CLAIMS
     report = options.report or kind.report
     found = told(kind, report, options.size)
     results = options.results or RESULTS / options.size
     target = (options.out or kind.docs) / options.size
     stores = [store["name"] for store in found["stores"]] if options.stores else []
+    if options.merge:
+        found = merged(kind, told(kind, target, options.size), found)
     text = forensics_page.page(found) if kind is SOUGHT else page(kind, found)
     with replaced(target) as fresh:
-        (fresh / "figures").mkdir()
+        for part in ("figures", "stores"):
+            if options.merge and (target / part).exists():
+                shutil.copytree(target / part, fresh / part)
+        (fresh / "figures").mkdir(exist_ok=True)
         for suffix in KEPT:
             for picture in sorted((report / "figures").glob(f"*.{suffix}")):
                 shutil.copy(picture, fresh / "figures")
         shutil.copy(report / f"{kind.name}.json", fresh)
+        if options.merge:
+            joined = json.dumps(found, indent=1, ensure_ascii=False)
+            (fresh / f"{kind.name}.json").write_text(joined + "\n", encoding="utf-8")
         (fresh / f"{kind.name}.md").write_text(text, encoding="utf-8")
         packed = [pack(results / name, fresh / "stores").relative_to(fresh) for name in stores]
     what = f"{len(found[kind.name])} {kind.name}" if kind.name in found else kind.name
@@ -118,6 +135,35 @@ def told(kind: Kind, report: Path, size: str) -> dict[str, Any]:
             f"run gnm {again} --size {size} first"
         )
     return found
+
+
+def merged(kind: Kind, kept: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """What is kept, with what `found` judged, drew and computed in its place or added to it.
+
+    A row that `found` could not judge stays as it is kept. Raises ValueError where such a row is
+    not kept, or was judged by another rule than the one that stands now.
+    """
+    before = {row["id"]: row for row in kept[kind.name]}
+    rows = []
+    for row in found[kind.name]:
+        old = before.get(row["id"])
+        if row["verdict"] != MISSING:
+            rows.append(row)
+        elif old is None or old["rule"] != row["rule"]:
+            why = "is not kept" if old is None else "was judged by another rule"
+            raise ValueError(
+                f"{row['id']} has no verdict in this report, and {why}: run its experiments "
+                f"({row['command']}) and gnm {kind.verb} first"
+            )
+        else:
+            rows.append(old)
+    stores = {store["name"]: store for store in (*kept["stores"], *found["stores"])}
+    joined = {**found, kind.name: rows, "stores": list(stores.values())}
+    for part in ("figures", "table"):
+        if part in found:
+            new = {name: value for name, value in found[part].items() if value}
+            joined[part] = {**kept.get(part, {}), **new}
+    return joined
 
 
 def page(kind: Kind, found: dict[str, Any]) -> str:

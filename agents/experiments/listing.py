@@ -40,7 +40,7 @@ SUBJECTS = (
 )
 """In the order of the paper, which is that of the report."""
 
-BEYOND = ("memory", "who_wins", "ceiling")
+BEYOND = ("memory", "who_wins", "ceiling", "hidden_unit", "when_memory")
 """In the order of the page on the findings."""
 
 SIZES = ("quick", "paper")
