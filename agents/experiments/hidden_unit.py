@@ -267,12 +267,14 @@ def _draw(results: Results) -> Figure:
         _mean_mark(axes, place + 0.32, mean(scores), INK)
     axes.set_xticks(range(len(_SHOWN)), [name for name, _ in _SHOWN.values()], fontsize=6)
     axes.set_xlim(-0.6, len(_SHOWN) - 0.3)
-    for places, name, colour in (
+    for between, name, colour in (
         ((0, 2), "linear, same gradient", GREY),
         ((3, 4), "network, BP", BLUE),
         ((5, 6), "linear, PeakError", RED),
     ):
-        axes.annotate(name, (np.mean(places), 10_450), ha="center", fontsize=7, color=colour)
+        axes.annotate(
+            name, (float(np.mean(between)), 10_450), ha="center", fontsize=7, color=colour
+        )
     for place in (2.6, 4.6):
         axes.axvline(place, color=GREY, lw=0.6)
     silent_line(axes, Task().silent_score)
@@ -295,7 +297,7 @@ def _draw_networks(axes: Axes, data: xr.Dataset) -> None:
             )  # fmt: skip
             if not how:
                 axes.fill_between(places, found[:, 1], found[:, 2], color=colour, alpha=0.13, lw=0)
-    axes.set_xticks(places, HIDDEN)
+    axes.set_xticks(places, [str(number) for number in HIDDEN])
     axes.set(xlabel="hidden neurons", ylabel=BINS)
     axes.legend(fontsize=6, loc="lower right")
     letter(axes, "a   networks")

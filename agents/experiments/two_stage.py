@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from agents.learning.rule import Rule, decay_option
+from agents.learning.rule import Rule, average_option, decay_option
 from agents.neurons.neuron import Neuron, PSPKernel, Response
 from agents.simd import where
 from gnm_env.checks import real
@@ -118,11 +118,14 @@ class GradientOfError(Rule):
         learning_rate: λ, weight change per unit of eligibility.
         momentum: fraction of the previous weight change that is added, 0 … 1.
         decay_trials: trials over which the learning rate falls to 0 in a line; None: constant.
+        average_over: first and last trial, counted from 1, of those after which the weights
+            count for a mean, which they become after the last; None: no averaging.
     """
 
     learning_rate: float = 3e-3
     momentum: float = 0.2
     decay_trials: int | None = decay_option()
+    average_over: tuple[int, int] | None = average_option()
 
     name: ClassVar[str] = "gradient-of-error"
     feedback: ClassVar[str] = "presentations"

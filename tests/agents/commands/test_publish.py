@@ -151,3 +151,29 @@ def test_forensics_have_a_folder_of_their_own(tmp_path: Path) -> None:
     assert "| F3e | MST | ≈ 377 | 300 … 475 | **390** |" in text
     with pytest.raises(ValueError, match="one by one"):
         run(["--forensics", "--findings"])
+
+
+def test_merged_keeps_what_the_report_could_not_judge(places: list[str], tmp_path: Path) -> None:
+    row = {**CLAIM, "rule": "reproduced if a", "command": "gnm sweep F3"}
+    report, docs = tmp_path / "report", tmp_path / "docs" / "quick"
+
+    def told(*claims: dict[str, Any]) -> None:
+        record = {"size": "quick", "claims": claims, "stores": []}
+        (report / "claims.json").write_text(json.dumps(record))
+
+    told(row)
+    run(places)
+    (report / "figures" / "F3.png").unlink()
+    (report / "figures" / "D.png").write_text("new")
+    missing = {**row, "verdict": "missing", "numbers": []}
+    added = {**row, "id": "D1", "numbers": ["three"]}
+    told(missing, added)
+    run(places, "--merge")
+    kept = json.loads((docs / "claims.json").read_text())["claims"]
+    assert kept == [row, added]
+    assert {path.name for path in docs.glob("figures/*.png")} == {"F3.png", "D.png"}
+    told({**missing, "rule": "reproduced if b"}, added)
+    with pytest.raises(ValueError, match="F3a has no verdict in this report, and was judged by an"):
+        run(places, "--merge")
+    with pytest.raises(ValueError, match="leave --merge out"):
+        run(places, "--merge", "--forensics")

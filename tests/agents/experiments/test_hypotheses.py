@@ -19,7 +19,10 @@ from agents.experiments.verdict import MISSING
 from gnm_env import Task
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "findings"
-IDS = ("M1", "M2", "M3", "M4", "W1", "W2", "W3", "C1", "C2", "C3")
+IDS = (
+    *("M1", "M2", "M3", "M4", "W1", "W2", "W3", "C1", "C2", "C3"),
+    *("U1", "U2", "U3", "U4", "N1", "N2", "N3", "N4", "N5"),
+)
 
 
 def told(size: str) -> dict[str, Any]:
