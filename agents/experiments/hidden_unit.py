@@ -272,11 +272,10 @@ def _draw(results: Results) -> Figure:
         ((3, 4), "network, BP", BLUE),
         ((5, 6), "linear, PeakError", RED),
     ):
-        axes.annotate(
-            name, (float(np.mean(between)), 10_450), ha="center", fontsize=7, color=colour
-        )
-    for place in (2.6, 4.6):
-        axes.axvline(place, color=GREY, lw=0.6)
+        middle = float(np.mean(between))
+        axes.annotate(name, (middle, 10_450), ha="center", fontsize=7, color=colour)
+    for border in (2.6, 4.6):
+        axes.axvline(border, color=GREY, lw=0.6)
     silent_line(axes, Task().silent_score)
     axes.set_ylim(0, 11_000)
     axes.set_yticks(range(0, 10_001, 2_000))
