@@ -9,7 +9,7 @@ BYTES_PER_WEIGHT = 56
 """A weight and its last change, in the agent and side by side (32), the agent's room for the input
 spikes of a trial (16), copies while they change hands (8)."""
 
-BYTES_PER_AGENT = 14_000
+BYTES_PER_AGENT = 16_500
 """Its Python objects and its room for the bins of a trial."""
 
 BYTES_PER_BIN, BYTES_PER_SPIKE = 528, 8

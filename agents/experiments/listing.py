@@ -61,9 +61,12 @@ def experiments(names: Sequence[str] = SUBJECTS) -> dict[str, Builder]:
 
 
 def claims() -> tuple[Claim, ...]:
-    """Every claim of the paper that is judged, in the paper's order."""
+    """Every claim of the paper that is judged: figures first, then supplement and discussion."""
     found = (claim for one in subjects() for claim in getattr(one, "CLAIMS", ()))
-    return tuple(sorted(found, key=lambda claim: claim.id))
+    return tuple(sorted(found, key=lambda claim: (_PARTS.index(claim.id[0]), claim.id)))
+
+
+_PARTS = "FSD"
 
 
 def hypotheses() -> tuple[Hypothesis, ...]:

@@ -86,7 +86,7 @@ def test_every_thread_counts_with_a_trial_of_its_own() -> None:
     task = Task(background_bins=10**6)
     source = TaskSource(task, Patterns.draw(task, 0))
     one, two = (bytes_needed(0, 64, source, threads) for threads in (1, 2))
-    assert one == pytest.approx(64 * 14_000 + 532 * 1_000_100 + 2**22)
+    assert one == pytest.approx(64 * 16_500 + 532 * 1_000_100 + 2**22)
     assert two - one == pytest.approx(532 * 1_000_100)
 
 
