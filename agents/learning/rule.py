@@ -215,7 +215,6 @@ class Rule(ABC):
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         ways = ("teaching_signal", "bin_signal", "side_by_side", "teach", "change", "block_change")
-        registry.register("rule", cls, (*ways, "weight_change", "weigh", "spike_probability"))
         if getattr(cls, "name", None) is None:
             return
         feedback = getattr(cls, "feedback", None)
@@ -231,6 +230,8 @@ class Rule(ABC):
         names = ("teaching_signal", "bin_signal", "side_by_side", "weigh", "spike_probability")
         parts = {name: getattr(cls, name) for name in names}
         cls._compiled = {name: part and portable(part) for name, part in parts.items()}
+        # Last: a class that is refused is not known by its name.
+        registry.register("rule", cls, (*ways, "weight_change", "weigh", "spike_probability"))
 
     @classmethod
     def compiled_parts(cls) -> dict[str, Any]:

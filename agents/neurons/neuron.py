@@ -76,9 +76,11 @@ class Neuron(Model):
     _compiled: ClassVar[tuple[str, Any]]
 
     def __init_subclass__(cls, **keywords: Any) -> None:
+        # Before the class is entered: one that is refused is not known by its name.
+        own_step = portable(cls.step) if "step" in vars(cls) else None
         super().__init_subclass__(**keywords)
-        if "step" in vars(cls):
-            cls._compiled = (cls.name, portable(cls.step))
+        if own_step is not None:
+            cls._compiled = (cls.name, own_step)
 
     def parameters(self) -> tuple[float, ...]:
         """The fields of the dataclass, in order; a neuron that needs other numbers overrides it."""

@@ -1,4 +1,4 @@
-"""Start a sweep ten times and kill it each time, at a random moment.
+"""Start a sweep ten times and kill it each time, once a random number of blocks more is there.
 
 Each start is a fork of this process, which has imported everything: it starts fast.
 """
@@ -38,20 +38,17 @@ def done(folder: Path) -> int:
 
 def main(folder: Path) -> None:
     """Print how each of the ten ended and how many blocks were there then."""
-    moments, ends, reached = random.Random(1), [], []
-    began = time.monotonic()
-    for k in range(10):
+    moments, ends, reached = random.Random(1), [], [0]
+    for _ in range(10):
         child = start(folder)
-        if k == 0:
-            while done(folder) < 3:
-                time.sleep(0.001)
-            usual = time.monotonic() - began  # on this machine, as busy as it is now
-        else:
-            time.sleep(moments.uniform(0.0, 1.5 * usual))
+        wanted = reached[-1] + moments.randint(0, 14)
+        while done(folder) < wanted:
+            time.sleep(0.001)
+        time.sleep(moments.uniform(0.0, 0.05))  # in the middle of a block, or of writing it
         os.kill(child, signal.SIGKILL)
         ends.append(os.waitpid(child, 0)[1])
         reached.append(done(folder))
-    print(json.dumps({"ends": ends, "done": reached}))
+    print(json.dumps({"ends": ends, "done": reached[1:]}))
 
 
 if __name__ == "__main__":

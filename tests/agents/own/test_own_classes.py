@@ -202,6 +202,18 @@ def test_a_step_that_branches_is_refused_by_its_line_and_what_to_write() -> None
                     return state, current
                 return state, 0.0
 
+    assert "branching" not in neurons()
+
+
+def test_a_rule_that_is_refused_is_not_known_by_its_name() -> None:
+    with pytest.raises(ValueError, match="Mute must say what it teaches"):
+
+        class Mute(Rule):
+            name: ClassVar[str] = "mute"
+            feedback: ClassVar[str] = "sign"
+
+    assert "mute" not in rules()
+
 
 @dataclass(frozen=True)
 class Broken(Neuron):
