@@ -69,6 +69,7 @@ MOMENTUM = {
     "none": {"momentum": 0.0},
     "none, λ × 1.25": {"momentum": 0.0, "learning_rate": 1.25e-4},
 }
+MOMENTUM_SEEDS = {"quick": range(4), "paper": range(48)}
 LENGTHS = (1_000, 3_000, 10_000)
 """Trials of trainings that end while neurons still learn."""
 
@@ -77,7 +78,7 @@ def momentum(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """The GNM with and without momentum after short trainings."""
     axes = (
         class_counts(1, 2),
-        pattern_seeds(seeds or SEEDS[size]),
+        pattern_seeds(seeds or MOMENTUM_SEEDS[size]),
         Axis("trials", LENGTHS, long_name="trials of training"),
         learners({name: {**GNM_ALL, **setting} for name, setting in MOMENTUM.items()}),
     )
