@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+from importlib.abc import SourceLoader
 from pathlib import Path
 from typing import Any
 
@@ -166,7 +167,11 @@ def load_module(place: str) -> Any:
             "rename the file"
         )
     spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None and isinstance(spec.loader, SourceLoader)
+    try:
+        spec.loader.get_code(path.stem)
+    except (SyntaxError, ValueError) as error:  # the latter for what is no text
+        raise ValueError(f"{place} cannot be read as Python: {error}") from None
     module = importlib.util.module_from_spec(spec)
     sys.modules[path.stem] = module
     try:

@@ -34,6 +34,8 @@ MEMORY = 12 * 2**30
 OWN = tuple(str(ROOT / name) + os.sep for name in ("gnm_env", "agents", "scripts"))
 REFUSALS = (ValueError, TypeError, IndexError, NotImplementedError, ImportError)
 CASE = "<case>"
+USERS_FILE = "mine.py"
+"""That cases write and have imported."""
 PYTHONS = (CASE, "<string>")  # the latter is where a frozen dataclass refuses
 
 
@@ -68,6 +70,8 @@ def judged(error: BaseException) -> tuple[str, str]:
         return "refused", text
     if own_words and raised and isinstance(error, (*REFUSALS, gym.error.Error)):
         return "refused", text
+    if any(Path(frame.filename).name == USERS_FILE for frame in frames):
+        return "refused", text  # what a file of the user's raises is that file's
     own = next((f for f in reversed(frames) if f.filename.startswith(OWN)), last)
     place = f"{Path(own.filename).name}:{own.lineno}"
     return "foreign", f"{text} [at {place}: {own.line}]"
