@@ -16,8 +16,9 @@ from gnm_env.compiled import compiled, inlined
 _INSERTED = 20
 """Up to this many of the largest eligibilities are found by insertion, more by cuts."""
 
-_FEW, _CUTS = 16.0, 8
-"""Cuts count all values until at most so many are left in each lane, or so often."""
+_BEFORE, _HIGH_PLACE, _LOW_PLACE = 8, 2, 13
+"""A sample is so large that 6 to 8 of its values are to be expected above the one that is sought;
+which then lies between these two of its places, counted from 0, some 19 times in 20."""
 
 
 @inlined
@@ -53,8 +54,16 @@ def nth_largest(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) ->
     """
     if n > _INSERTED:
         return _between(values, n, learns, lanes)
-    # The n + 1 largest so far, descending; every value sinks to its place, four at a time so that
-    # the list is read and written once for four values.
+    return load(_largest(values, n, lanes), n, lanes)
+
+
+@compiled
+def _largest(values: NDArray[np.float64], n: int, lanes: Any) -> NDArray[np.float64]:
+    """The n + 1 largest values of each lane, descending; −∞ where there are not as many.
+
+    Every value sinks to its place, four at a time so that the list is read and written once for
+    four values.
+    """
     largest = np.full((n + 1, values.shape[1]), -np.inf)
     whole = len(values) - len(values) % 4
     for i in range(0, whole, 4):
@@ -73,54 +82,47 @@ def nth_largest(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) ->
             place = load(largest, k, lanes)
             store(largest, k, where(a > place, a, place))
             a = where(a > place, place, a)
-    return load(largest, n, lanes)
+    return largest
 
 
 @inlined
 def _between(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> Any:
-    """`nth_largest` in O(N) whatever n, in all lanes at once: cuts between the lowest and highest.
+    """`nth_largest` in O(N) whatever n, in all lanes at once (after Floyd & Rivest 1975).
 
-    low <= the (n+1)-th largest <= high throughout. A cut with exactly n values above it is as good
-    as that value and ends the search. Once few values are left between low and high, their rows are
-    taken aside; from then on low and high are values themselves, so that ties end it as well.
+    A sample says between which two numbers the value lies in all likelihood. One look at all values
+    tells whether it does, and takes aside what is between them, which a few cuts go through.
     """
-    zero = like(0.0, lanes)
-    low, high = _extremes(values, lanes)
-    above_low, above_high = like(float(len(values)), lanes), zero
-    cut = low  # at once the answer where most eligibilities are 0
-    cuts = 0
-    while cuts < _CUTS and any_lane(learns & (low < high) & (above_low - above_high > _FEW)):
-        above = _count_above(values, cut)
-        few = above <= n
-        low, high = where(few, low, cut), where(few, cut, high)
-        above_low, above_high = where(few, above_low, above), where(few, above, above_high)
-        low = where(above == n, high, low)
-        cuts += 1
-        cut = _next_cut(low, high, above_low, above_high, n, cuts)
-    if not any_lane(learns & (low < high)):
-        return high
-    rest = np.empty_like(values)
+    sample = _largest(values[:: n // _BEFORE + 1], _LOW_PLACE, lanes)
+    low = where(learns, load(sample, _LOW_PLACE, lanes), np.inf)
+    high = where(learns, load(sample, _HIGH_PLACE, lanes), -np.inf)
+    rest = np.empty((len(values), values.shape[1]))
+    rows, from_low, above_high = _taken_aside(values, low, high, rest)
+    missed = learns & ((from_low <= n) | (above_high > n))
+    if any_lane(missed):
+        lowest, highest = _extremes(values, lanes)
+        low, high = where(missed, lowest, low), where(missed, highest, high)
+        rows, from_low, above_high = _taken_aside(values, low, high, rest)
+    return _by_cuts(rest, rows, low, high, from_low, above_high, n)
+
+
+@compiled
+def _taken_aside(
+    values: NDArray[np.float64], low: Any, high: Any, rest: NDArray[np.float64]
+) -> tuple[int, Any, Any]:
+    """Copy into `rest` the rows in which some lane has a value from low to high.
+
+    Returns their number and, of all values, how many are at least low and how many above high.
+    """
+    zero = like(0.0, low)
+    from_low, above_high = zero, zero
     rows = 0
     for i in range(len(values)):
-        x = load(values, i, lanes)
+        x = load(values, i, zero)
         store(rest, rows, x)
-        rows += any_lane(learns & (low < high) & (low <= x) & (x <= high))
-    while any_lane(learns & (low < high)):
-        above, nearest_below, nearest_above = above_high, low, high
-        for i in range(rows):
-            x = load(rest, i, lanes)
-            over = x > cut
-            above = above + where(over & (x <= high), 1.0, zero)
-            x_above, x_below = where(over, x, high), where(over, low, x)
-            nearest_above = where(x_above < nearest_above, x_above, nearest_above)
-            nearest_below = where(x_below > nearest_below, x_below, nearest_below)
-        few = above <= n
-        low, high = where(few, low, nearest_above), where(few, nearest_below, high)
-        above_low, above_high = where(few, above_low, above), where(few, above, above_high)
-        low = where(above == n, high, low)
-        cuts += 1
-        cut = _next_cut(low, high, above_low, above_high, n, cuts)
-    return high
+        rows += any_lane((low <= x) & (x <= high))
+        from_low = from_low + where(low <= x, 1.0, zero)
+        above_high = above_high + where(x > high, 1.0, zero)
+    return rows, from_low, above_high
 
 
 @inlined
@@ -133,29 +135,49 @@ def _extremes(values: NDArray[np.float64], lanes: Any) -> tuple[Any, Any]:
     return low, high
 
 
-@compiled
-def _count_above(values: NDArray[np.float64], cut: Any) -> Any:
-    """How many values lie above the cut, in each lane."""
-    zero = like(0.0, cut)
-    count = zero
-    whole = len(values) - len(values) % 4
-    for i in range(0, whole, 4):  # four at a time: a sum has to wait for the one before it
-        a = where(load(values, i, cut) > cut, 1.0, zero)
-        b = where(load(values, i + 1, cut) > cut, 1.0, zero)
-        c = where(load(values, i + 2, cut) > cut, 1.0, zero)
-        d = where(load(values, i + 3, cut) > cut, 1.0, zero)
-        count = count + ((a + b) + (c + d))
-    for i in range(whole, len(values)):
-        count = count + where(load(values, i, cut) > cut, 1.0, zero)
-    return count
-
-
 @inlined
-def _next_cut(low: Any, high: Any, above_low: Any, above_high: Any, n: int, cuts: int) -> Any:
-    """Where n values would lie above if they lay evenly; every other time the middle."""
-    share = like(0.5, low) if cuts % 2 == 0 else (n + 0.5 - above_high) / (above_low - above_high)
-    cut = high - share * (high - low)
-    return where((low <= cut) & (cut < high), cut, low)
+def _by_cuts(
+    rest: NDArray[np.float64],
+    rows: int,
+    low: Any,
+    high: Any,
+    from_low: Any,
+    above_high: Any,
+    n: int,
+) -> Any:
+    """The (n+1)-th largest value of each lane, where `rest` has those from low to high; uses it up.
+
+    low <= the value <= high throughout; `from_low` values are at least low, `above_high` are above
+    high. After each cut low and high are values themselves, so that ties end the search; rows in
+    which no lane has a value between them are left out.
+    """
+    zero = like(0.0, low)
+    cuts = 0
+    while any_lane(low < high):
+        # Where n values would lie above if they lay evenly; every other time the middle.
+        share = like(0.5, low) if cuts % 2 else (n + 0.5 - above_high) / (from_low - above_high)
+        cut = high - share * (high - low)
+        cut = where((low <= cut) & (cut < high), cut, low)
+        cuts += 1
+        bottom = where(low < high, low, np.inf)  # nothing is inside where the value is found
+        above, nearest_below, nearest_above = above_high, low, high
+        before, rows = rows, 0
+        for i in range(before):
+            x = load(rest, i, zero)
+            inside = (bottom <= x) & (x <= high)
+            x = where(inside, x, -np.inf)
+            store(rest, rows, x)
+            rows += any_lane(inside)
+            over = x > cut
+            above = above + where(over, 1.0, zero)
+            x_above, x_below = where(over, x, high), where(over, low, x)
+            nearest_above = where(x_above < nearest_above, x_above, nearest_above)
+            nearest_below = where(x_below > nearest_below, x_below, nearest_below)
+        few = above <= n
+        low, high = where(few, low, nearest_above), where(few, nearest_below, high)
+        from_low, above_high = where(few, from_low, above), where(few, above, above_high)
+        low = where(above == n, high, low)
+    return high
 
 
 @dataclass(frozen=True)

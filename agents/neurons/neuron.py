@@ -77,7 +77,7 @@ class Neuron(Model):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         # Before the class is entered: one that is refused is not known by its name.
-        own_step = portable(cls.step) if "step" in vars(cls) else None
+        own_step = portable(cls.step) if {"name", "step"} <= vars(cls).keys() else None
         super().__init_subclass__(**keywords)
         if own_step is not None:
             cls._compiled = (cls.name, own_step)

@@ -127,18 +127,42 @@ def test_a_large_fraction_of_many_inputs_is_found_as_sorting_finds_it(fraction: 
     assert np.array_equal(agent.velocity > 0, chosen)
 
 
-@pytest.mark.parametrize("width", [1, 8])
-def test_the_same_values_lie_above_the_bar_as_above_the_one_that_sorting_finds(width: int) -> None:
+def bars(values: NDArray[np.float64], places: list[int]) -> NDArray[np.float64]:
+    """What `nth_largest` gives for each place, (places, width)."""
+    width = values.shape[1]
+
     @njit(error_model="numpy")
     def bar(values: NDArray[np.float64], n: int, out: NDArray[np.float64]) -> None:
         zero = full(0.0, width)
         store(out, 0, nth_largest(values, n, zero == zero, zero))
 
-    values = np.random.default_rng(2).integers(-20, 20, (103, width)) / 8  # with many ties
-    out = np.empty((1, width))
-    for n in (0, 1, 9, 10, 47, 48, 49, 75, 102):
-        bar(values, n, out)
-        assert np.array_equal(values > out[0], values > -np.sort(-values, axis=0)[n]), n
+    found = np.empty((len(places), width))
+    for row, n in enumerate(places):
+        bar(values, n, found[row : row + 1])
+    return found
+
+
+@pytest.mark.parametrize("width", [1, 8])
+@pytest.mark.parametrize("kind", ["ties", "spread", "all equal", "sample lies", "infinite"])
+def test_the_same_values_lie_above_the_bar_as_above_the_one_that_sorting_finds(
+    kind: str, width: int
+) -> None:
+    rng = np.random.default_rng(2)
+    for n_values in (103, 256, 1_000):
+        values = rng.integers(-20, 20, (n_values, width)) / 8
+        if kind == "spread":
+            values = rng.lognormal(0.0, 3.0, (n_values, width))
+        elif kind == "all equal":
+            values[:] = 0.5
+        elif kind == "sample lies":  # every value in a sample is among the highest, or the lowest
+            values[:: n_values // 80 + 1] += np.where(np.arange(width) % 2, 100.0, -100.0)
+        elif kind == "infinite":
+            values[rng.random(values.shape) < 0.3] = np.inf
+            values[rng.random(values.shape) < 0.3] = -np.inf
+        places = [0, 1, 9, 20, 21, 47, 75, 100, n_values // 2, n_values - 2, n_values - 1]
+        in_order = -np.sort(-values, axis=0)
+        for n, found in zip(places, bars(values, places), strict=True):
+            assert np.array_equal(values > found, values > in_order[n]), (n_values, n)
 
 
 def test_nothing_changes_when_the_sum_is_right_the_momentum_included() -> None:
