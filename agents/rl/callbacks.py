@@ -120,7 +120,8 @@ class Milestones(BaseCallback):
         reached: gets the milestone, the steps really done, and the seconds of training so far.
 
     Attributes:
-        seconds: time of training so far, without that of the calls.
+        seconds: processor time of training so far, without that of the calls: what other programs
+            take of the machine does not count.
     """
 
     def __init__(
@@ -133,7 +134,7 @@ class Milestones(BaseCallback):
         self.seconds = 0.0
 
     def _on_training_start(self) -> None:
-        self._since = time.perf_counter()
+        self._since = time.process_time()
 
     def _on_rollout_start(self) -> None:
         self._look()
@@ -145,7 +146,7 @@ class Milestones(BaseCallback):
         return True
 
     def _look(self) -> None:
-        self.seconds += time.perf_counter() - self._since
+        self.seconds += time.process_time() - self._since
         while self._left and self.num_timesteps >= self._left[0]:
             self._reached(self._left.pop(0), self.num_timesteps, self.seconds)
-        self._since = time.perf_counter()
+        self._since = time.process_time()

@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from gymnasium.vector import VectorEnv
 from sb3_contrib import RecurrentPPO
-from stable_baselines3 import DQN, PPO
+from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
@@ -40,7 +40,7 @@ FILE = Path(__file__).with_suffix(".toml")
 """Every kind's hyperparameters: none of them stands in code."""
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
-    algorithm.__name__: algorithm for algorithm in (PPO, RecurrentPPO, DQN)
+    algorithm.__name__: algorithm for algorithm in (PPO, A2C, RecurrentPPO, DQN)
 }
 OWN_POLICIES: dict[str, type[Any]] = {
     policy.__name__: policy for policy in (LstmPolicy, LeakyPolicy, GnmPolicy, SpikingPolicy)
@@ -106,7 +106,7 @@ def _from_table(table: dict[str, Any]) -> Hyperparameters:
     def settings(n_envs: int) -> dict[str, Any]:
         made: dict[str, Any] = copy.deepcopy(table)
         if "rollout" in made:
-            made |= _rollout(n_envs, made.pop("rollout"), made.pop("minibatches"))
+            made |= _rollout(n_envs, made.pop("rollout"), made.pop("minibatches", None))
         rate = made["learning_rate"]
         if isinstance(rate, str):
             if not rate.startswith(_FALLING):
@@ -120,8 +120,10 @@ def _from_table(table: dict[str, Any]) -> Hyperparameters:
     )
 
 
-def _rollout(n_envs: int, bins: int, minibatches: int) -> dict[str, Any]:
-    """Steps per environment and size of a minibatch, for about `bins` bins in equal parts."""
+def _rollout(n_envs: int, bins: int, minibatches: int | None) -> dict[str, Any]:
+    """Steps per environment for about `bins` bins, and the size of a minibatch if they are cut."""
+    if minibatches is None:
+        return {"n_steps": max(bins // n_envs, 1)}
     n_steps = minibatches * max(bins // (minibatches * n_envs), 1)
     return {"n_steps": n_steps, "batch_size": n_steps * n_envs // minibatches}
 
@@ -197,6 +199,8 @@ def make_rl_agent(
       settling too early: without it most patterns of two classes are never told apart.
     - "ppo-linear": the same without hidden layers: spikes where a weighted sum of traces is high,
       the nearest relative of the neurons here. With so few weights larger steps are safe.
+    - "a2c": the perceptron of "ppo", with one step of the gradient for each 4,096 bins heard and
+      none repeated: three times as fast as PPO.
     - "recurrent-ppo": an LSTM on the bits of the present bin and the last action, which has to find
       its own traces; see `agents.rl.memory` for its start.
     - "leaky-ppo": leaky integrators whose decays are learned in the LSTM's place, below a layer of

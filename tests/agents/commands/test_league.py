@@ -74,10 +74,15 @@ def test_the_last_score_is_that_of_a_neuron_trained_in_one_go():
 
 def test_an_rl_agent_is_scored_between_rollouts():
     pytest.importorskip("stable_baselines3")
-    values = cell(RL_LEARNERS["PPO linear, cost"], budget=110_000, runs=3, cap=50)
+    values = cell(RL_LEARNERS["PPO linear, cost"], most=110_000, runs=3, cap=50)
     assert values["heard"].tolist() == [114_688, *[-1] * (FINAL - 1), 114_688]
     assert values["seconds"][0] > 0
     assert values["parameters"] == 102 * 2 + 2 + 102 + 1
+
+
+def test_on_more_classes_than_it_has_bins_for_a_learner_is_not_trained():
+    values = cell(RL_LEARNERS["PPO linear, cost"], classes=3, runs=3, cap=50)
+    assert np.all(values["survived"] == -1) and np.all(values["heard"] == -1)
 
 
 def made_up(learners: dict[str, float], seeds: int = 4) -> xr.Dataset:
@@ -143,7 +148,7 @@ def test_the_picture_is_drawn_from_the_results_alone(tmp_path):
 
 def test_every_learner_that_learns_has_a_style_of_its_own():
     learning = {n for n, s in NEURON_LEARNERS.items() if "reference" not in s}
-    learning |= {n for n, s in RL_LEARNERS.items() if s.get("steps") != 0}
+    learning |= {n for n, s in RL_LEARNERS.items() if s["bins"] != (0, 0)}
     assert learning == set(league.STYLES)
     assert len(set(league.STYLES.values())) == len(league.STYLES)
 
@@ -211,8 +216,8 @@ def test_a_search_and_its_league_run_from_end_to_end(tmp_path, monkeypatch):
 
 def test_steps_shorten_the_training_of_rl_agents_alone():
     pytest.importorskip("stable_baselines3")
-    assert league.league("rl", "quick", steps=5).blocks()[0].settings[0]["budget"] == 5
-    assert "budget" not in league.league("neurons", "quick", steps=5).blocks()[0].settings[0]
+    assert league.league("rl", "quick", steps=5).blocks()[0].settings[0]["most"] == 5
+    assert "most" not in league.league("neurons", "quick", steps=5).blocks()[0].settings[0]
 
 
 @pytest.mark.parametrize("size", ["quick", "full"])

@@ -92,7 +92,7 @@ def test_a_model_of_another_algorithm_is_refused(folder, tmp_path, model):
     with pytest.raises(ValueError, match="ppo is a PPO, and the model is a DQN"):
         save(tmp_path / "other", dqn, "ppo", TASK, PATTERNS)
     with pytest.raises(ValueError, match="kind must be one of"):
-        save(tmp_path / "other", model, "a2c", TASK, PATTERNS)
+        save(tmp_path / "other", model, "sac", TASK, PATTERNS)
     dqn.save(folder / "model.zip")
     with pytest.raises(ValueError, match="not a readable PPO model"):
         load(folder)

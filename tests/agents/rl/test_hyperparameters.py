@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 from sb3_contrib import RecurrentPPO
-from stable_baselines3 import DQN, PPO
+from stable_baselines3 import A2C, DQN, PPO
 
 from agents.rl import HYPERPARAMETERS, TRACES, make_rl_agent, read_hyperparameters, training_env
 from agents.rl.hyperparameters import FILE, n_parameters
@@ -24,6 +24,7 @@ PATTERNS = Patterns.draw(TASK, 0)
 CLASSES = {
     "ppo": PPO,
     "ppo-linear": PPO,
+    "a2c": A2C,
     "recurrent-ppo": RecurrentPPO,
     "leaky-ppo": RecurrentPPO,
     "gnm-ppo": RecurrentPPO,
@@ -146,7 +147,7 @@ def test_what_the_file_says_is_what_the_model_has(kind):
     assert model.lr_schedule(0.0) == 0.0
     assert chosen.settings(4)["policy_kwargs"] == model.policy_kwargs | {}
     if "n_steps" in settings:
-        assert settings["n_steps"] * 4 == 16_384
+        assert settings["n_steps"] * 4 == (4_096 if kind == "a2c" else 16_384)
 
 
 @pytest.mark.parametrize(
