@@ -42,10 +42,13 @@ if TYPE_CHECKING:
 MILESTONES = (100_000, 200_000, 400_000, 800_000, 1_600_000, 4_000_000, 8_000_000, 12_000_000)
 """Bins heard at which a learner is scored; it is scored once more when its budget is spent."""
 
+RL_MILESTONES = (100_000, 400_000, 1_600_000, 4_000_000)
+"""Those of RL agents: to score a policy bin by bin takes as long as many updates."""
+
 FINAL = len(MILESTONES)
 """Place of the last score along the axis "milestone"."""
 
-MATCHED = {1: 1_600_000, 2: 4_000_000, 3: 8_000_000, 4: 8_000_000}
+MATCHED = {1: 1_600_000, 2: 4_000_000, 3: 4_000_000, 4: 4_000_000}
 """Bins at which all are compared, by number of classes: PPO's budget."""
 
 PARTS = ("neurons", "rl")
@@ -80,7 +83,7 @@ RL_LEARNERS: dict[str, Setting] = {
     "PPO, dense": {
         "algorithm": "ppo",
         "feedback": "dense",
-        "bins": (1_600_000, 4_000_000, 8_000_000, 8_000_000),
+        "bins": (1_600_000, 4_000_000, 4_000_000, 4_000_000),
     },
     "PPO linear, cost": {
         "algorithm": "ppo-linear",
@@ -108,7 +111,7 @@ RL_LEARNERS: dict[str, Setting] = {
         "feedback": "dense",
         "bins": (1_600_000, 1_600_000),
     },
-    "DQN, dense": {"algorithm": "dqn", "feedback": "dense", "bins": (800_000, 400_000)},
+    "DQN, dense": {"algorithm": "dqn", "feedback": "dense", "bins": (400_000, 400_000)},
     "PPO, random weights": {
         "algorithm": "ppo",
         "feedback": "cost",
@@ -293,9 +296,10 @@ def _rl_agent(setting: Setting, sheet: ScoreSheet) -> int:
         sheet.score(MILESTONES.index(milestone), agent, heard, seconds)
 
     if budget:
-        clock = Milestones([m for m in MILESTONES if m <= budget], score)
+        clock = Milestones([m for m in RL_MILESTONES if m <= budget], score)
         model.learn(budget, callback=clock)
-        sheet.score(FINAL, agent, model.num_timesteps, clock.seconds)
+        if sheet.heard[FINAL] < model.num_timesteps:
+            sheet.score(FINAL, agent, model.num_timesteps, clock.seconds)
     else:
         sheet.score(FINAL, agent, 0, 0.0)
     return n_parameters(model)
