@@ -15,6 +15,7 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
     pack(block, t)           the reverse
     repeated(Type, x)        a NamedTuple whose fields are all x
     where(mask, x, y)        x where the mask holds, y elsewhere; both are evaluated
+    seldom(mask, x, y)       as where, for a mask that seldom holds
     any_lane(mask)           whether the mask holds anywhere
     lanes_of(mask)           the lanes in which it holds, as bits of a number
     next_lane(lanes)         the lowest of them
@@ -191,6 +192,33 @@ def _select_masks(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     pair = zip(args[1:], sig.args[1:], strict=True)
     masks = (v if isinstance(t, Mask) else _splat(builder, v, width) for v, t in pair)
     return builder.select(args[0], *masks)
+
+
+@_intrinsic
+def seldom(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
+    """As `where`, for masks that seldom hold and what the next bin waits for.
+
+    Alone it is a branch that the processor foretells, so that nothing has to wait for the mask.
+    """
+    width = max(map(_width, (mask, x, y)))
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pair = zip(args[1:], sig.args[1:], strict=True)
+        chosen, usual = (_spread(context, builder, v, t, width) for v, t in pair)
+        if width > 1:
+            return builder.select(args[0], chosen, usual)
+        before = builder.block
+        taken, after = builder.append_basic_block(), builder.append_basic_block()
+        builder.cbranch(args[0], taken, after).set_weights([1, 2000])
+        builder.position_at_end(taken)
+        builder.branch(after)
+        builder.position_at_end(after)
+        result = builder.phi(_DOUBLE)
+        result.add_incoming(chosen, taken)
+        result.add_incoming(usual, before)
+        return result
+
+    return _lanes(width)(mask, x, y), generate
 
 
 @_intrinsic

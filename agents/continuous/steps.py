@@ -22,6 +22,8 @@ class Parameters(NamedTuple):
     h: Any
     flat_below: Any
     flat_above: Any
+    low: Any
+    high: Any
     max_output: Any
     left: Any
     """e^−(1−η)α, what is left of V after a bin; of use for η = 0 only."""

@@ -35,6 +35,10 @@ class Parameters(NamedTuple):
     """V/ϑ_B below which the Hill function is 0 to within 2⁻⁶⁰ …"""
     flat_above: Any
     """… and above which it is 1 to within rounding."""
+    low: Any
+    """V below which V/ϑ_B is at most flat_below, for normal numbers however it is rounded …"""
+    high: Any
+    """… and above which it is at least flat_above."""
 
 
 class State(NamedTuple):
@@ -50,12 +54,15 @@ def hill_template(p: Parameters, static: tuple[int, ...], V: Any) -> Any:
     """
     if RECOVERY == INFINITE:
         return where(p.theta_b < V, 1.0, where(p.theta_b == V, 0.5, like(0.0, V)))
-    u = V / p.theta_b
-    H = where(u > 1.0, 1.0, like(0.0, V))
-    steep = (u > p.flat_below) & (u < p.flat_above)
-    if any_lane(steep):
-        u_h = whole_power(u, static[1]) if RECOVERY == WHOLE else power(u, p.h)
-        H = where(steep, u_h / (1.0 + u_h), H)
+    H = like(0.0, V)
+    if any_lane(p.low < V):
+        H = where(p.theta_b < V, 1.0, H)
+        if any_lane((p.low < V) & (V < p.high)):
+            # Not outside: a division takes as long as the rest of the bin.
+            u = V / p.theta_b
+            steep = (u > p.flat_below) & (u < p.flat_above)
+            u_h = whole_power(u, static[1]) if RECOVERY == WHOLE else power(u, p.h)
+            H = where(steep, u_h / (1.0 + u_h), H)
     return H
 
 
@@ -147,6 +154,7 @@ class GNM(Neuron):
         return int(self.readout == "D")
 
     def parameters(self) -> tuple[float, ...]:
+        flat_below, flat_above = 2.0 ** (-60.0 / self.h), 2.0 ** (54.0 / self.h)
         return (
             (1.0 - self.eta) * self.alpha,
             self.eta * self.gamma,
@@ -155,8 +163,10 @@ class GNM(Neuron):
             self.theta_b,
             self.theta_r,
             self.h,
-            2.0 ** (-60.0 / self.h),
-            2.0 ** (54.0 / self.h),
+            flat_below,
+            flat_above,
+            flat_below * self.theta_b * (1.0 - 2.0**-50),
+            flat_above * self.theta_b * (1.0 + 2.0**-50),
         )
 
     def static(self, n_inputs: int) -> tuple[int, ...]:

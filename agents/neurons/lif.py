@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from agents.neurons.neuron import Neuron, PSPKernel, Response
-from agents.simd import where
+from agents.simd import seldom, where
 from gnm_env.checks import MAX_BINS, real, whole
 from gnm_env.compiled import inlined
 
@@ -34,8 +34,9 @@ def step(
     D = p.alpha * state.V
     V = state.V + where(state.waiting > 0.0, 0.0, current) - D
     spike = p.theta <= V
-    waiting = where(spike, p.refractory, where(state.waiting > 0.0, state.waiting - 1.0, 0.0))
-    return State(where(spike, 0.0, V), waiting), Response(V, D, state.waiting, V, spike, spike)
+    left = where(state.waiting > 0.0, state.waiting - 1.0, 0.0)
+    after = State(seldom(spike, 0.0, V), seldom(spike, p.refractory, left))
+    return after, Response(V, D, state.waiting, V, spike, spike)
 
 
 @dataclass(frozen=True)

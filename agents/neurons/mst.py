@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from agents.neurons.neuron import Neuron, PSPKernel, Response
-from agents.simd import where
+from agents.simd import seldom
 from gnm_env.checks import real
 from gnm_env.compiled import inlined
 from gnm_env.rules import compiled_rising as rising
@@ -46,7 +46,7 @@ def step(
     D = p.theta * state.reset
     V = p.scale * (slow - fast) - D
     spike = rising(p.theta, V, state.V)
-    reset = p.slow * (state.reset + where(spike, 1.0, 0.0))
+    reset = p.slow * seldom(spike, state.reset + 1.0, state.reset)
     return State(slow, fast, reset, V), Response(V, D, state.reset, V, p.theta <= V, spike)
 
 

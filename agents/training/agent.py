@@ -276,14 +276,14 @@ class Agent:
 
     def _step(self, obs: NDArray[Any]) -> float:
         row = self._checked(obs, (self._n_inputs,))
-        assert self._heard is not None
         try:
-            out: float = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+            out: float = self._loops.step(row, self._bin, *self._parts)
         except COMPILING as error:
             raise explained(error, self._model) from None
         if out < 0.0:
+            assert self._heard is not None
             self._make_room(2 * len(self._heard.V), 2 * len(self._heard.channels))
-            out = self._loops.step(self._block, self._state, row, self._bin, self._heard)
+            out = self._loops.step(row, self._bin, *self._parts)
         if self.rng is not None:
             out = self._drawn()
         self._bin += 1
@@ -398,6 +398,12 @@ class Agent:
             for short, place in pairs:
                 place[: len(short)] = short
         self._heard = long
+        block = self._block
+        # What `step` takes, array by array.
+        self._parts = (
+            self._state, block.static, block.n_notes, block.parameters,
+            block.arrays.weights, block.arrays.memory, *long,
+        )  # fmt: skip
 
     # --- without learning ------------------------------------------------------------------------
 
@@ -542,7 +548,7 @@ class Agent:
         return agent
 
 
-_DERIVED = {"_loops", "_n_state", "_state", "_block", "_rule_block", "_heard", "_bin"}
+_DERIVED = {"_loops", "_n_state", "_state", "_block", "_rule_block", "_heard", "_parts", "_bin"}
 """Attributes that `_prepare` makes of the others."""
 
 
@@ -601,9 +607,12 @@ def _require_numbers(model: Model) -> None:
         )
 
 
+_BITS = np.dtype(np.int8)  # compared in half the time that np.int8 takes
+
+
 def bits_of(obs: Any) -> NDArray[np.int8]:
     """Observations as contiguous int8; ValueError unless they are 0 and 1 (int8 is believed)."""
-    if type(obs) is np.ndarray and obs.dtype == np.int8 and obs.flags.c_contiguous:
+    if type(obs) is np.ndarray and obs.dtype == _BITS and obs.flags.c_contiguous:
         return obs
     array = _array(obs)
     if array.dtype.kind not in "fiub" or not np.isin(array, (0, 1)).all():

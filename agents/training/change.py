@@ -125,7 +125,8 @@ def sum_eligibility_template(
                 fast = y + p.fast * fast
                 gain = p.scale * (slow - fast)
             for e in range(trial.offsets[t], trial.offsets[t + 1]):
-                channel = trial.channels[e]
+                # Unsigned: signed indices count from the end as well, and numba pays for looking.
+                channel = trial.channels[np.uint64(e)]
                 store(eligibility, channel, load(eligibility, channel, zero) + gain)
     return taught
 

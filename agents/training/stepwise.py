@@ -68,33 +68,47 @@ def record_template(
 
 
 def step_template(
-    model: ModelBlock, state: Block, observation: NDArray[np.int8], t: int, heard: Heard
+    observation: NDArray[np.int8],
+    t: int,
+    state: Block,
+    static: tuple[int, ...],
+    n_notes: int,
+    parameters: Block,
+    weights: Block,
+    memory: Block,
+    channels: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    V: Block,
+    above: Block,
+    outputs: Block,
+    readout: Block,
+    notes: Block,
 ) -> float:
     """One bin of the standard loop: note what is heard, take the step, note what came of it.
 
-    Returns the output, or −1 if a buffer is too short for bin `t`.
+    Every array by itself, the last seven those of `Heard`: to take tuples of arrays apart on the
+    way from Python would cost twice as much as all the rest. Returns the output, or −1 if a buffer
+    is too short for bin `t`.
     """
     zero = full(0.0, WIDTH)
-    n_events = heard.offsets[t]
-    if t == len(heard.V) or n_events + len(observation) > len(heard.channels):
+    n_events = offsets[t]
+    if t == len(V) or n_events + len(observation) > len(channels):
         return -1.0
     for i in range(len(observation)):
         if observation[i] != 0:
-            heard.channels[n_events] = i
+            channels[n_events] = i
             n_events += 1
-    heard.offsets[t + 1] = n_events
-    p = unpack(Parameters, model.parameters, zero)
-    arrays = Arrays(model.arrays.weights, model.arrays.memory, heard.notes)
+    offsets[t + 1] = n_events
     new_state, response = advance(
-        p, model.static, arrays, unpack(State, state, zero),
-        heard.channels, heard.offsets[t], n_events, t * model.n_notes,
+        unpack(Parameters, parameters, zero), static, Arrays(weights, memory, notes),
+        unpack(State, state, zero), channels, offsets[t], n_events, t * n_notes,
     )  # fmt: skip
     pack(state, new_state)
     out = output(response, zero)
-    store(heard.V, t, response.V)
-    store(heard.above, t, where(active(response), 1.0, zero))
-    store(heard.output, t, out)
-    store(heard.readout, t, response.X)
+    store(V, t, response.V)
+    store(above, t, where(active(response), 1.0, zero))
+    store(outputs, t, out)
+    store(readout, t, response.X)
     return out
 
 

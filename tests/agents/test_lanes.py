@@ -24,6 +24,7 @@ from agents.simd import (
     pack,
     power,
     repeated,
+    seldom,
     store,
     times_two_to_the,
     unpack,
@@ -69,6 +70,8 @@ EXPECTED: dict[str, Any] = {
     "where both plain": lambda x, y, s, n: np.where(x > y, s, float(n)),
     "like": lambda x, y, s, n: np.full_like(x, s),
     "any_lane": lambda x, y, s, n: np.full_like(x, np.any(x > y)),
+    "seldom lanes": lambda x, y, s, n: np.where(x > y, x, y),
+    "seldom plain": lambda x, y, s, n: np.where(x > y, s, float(n)),
     "formula": lambda x, y, s, n: (x + s - 0.3 * y) * x / (1.0 + y),
 }
 
@@ -114,7 +117,9 @@ def _operators(width: int) -> Any:
             store(o, 24, where(x > y, s, float(n)))
             store(o, 25, like(s, x))
             store(o, 26, like(1.0 if any_lane(x > y) else 0.0, x))
-            store(o, 27, (x + s - 0.3 * y) * x / (1.0 + y))
+            store(o, 27, seldom(x > y, x, y))
+            store(o, 28, seldom(x > y, s, float(n)))
+            store(o, 29, (x + s - 0.3 * y) * x / (1.0 + y))
 
     return run
 

@@ -96,6 +96,33 @@ def test_the_hill_function_is_one_half_at_its_threshold_whatever_the_exponent(h:
     assert heard.R[1] == 0.5
 
 
+@pytest.mark.parametrize("theta_b", [0.7, 1.0, 1.3])
+@pytest.mark.parametrize("h", [1.0, 3.0, 200.0])
+def test_the_hill_function_has_the_bits_of_its_formula_where_it_turns_flat(
+    h: float, theta_b: float
+) -> None:
+    neuron = GNM(alpha=0.0, eta=0.5, beta=0.0, h=h, theta_b=theta_b)
+    flat_below, flat_above = 2.0 ** (-60.0 / h), 2.0 ** (54.0 / h)
+    for centre in (flat_below * theta_b, theta_b, flat_above * theta_b):
+        for ulps in range(-12, 13):
+            V = centre + ulps * np.spacing(centre)
+            u = V / theta_b
+            H = 1.0 if u > 1.0 else 0.0
+            if flat_below < u < flat_above:
+                H = power_by_squaring(u, int(h)) / (1.0 + power_by_squaring(u, int(h)))
+            assert respond(neuron, np.eye(2, dtype=np.bool_), [V, 0.0]).R[1] == H, (V, ulps)
+
+
+def power_by_squaring(x: float, exponent: int) -> float:
+    result = 1.0
+    while exponent:
+        if exponent & 1:
+            result *= x
+        x *= x
+        exponent >>= 1
+    return result
+
+
 def test_the_reset_variable_stays_at_rest_below_zero() -> None:
     heard = respond(GNM(eta=0.5, h=2.0), np.eye(3, dtype=np.bool_), [-3.0, -3.0, 1.0])
     assert heard.V[0] == -3.0
