@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.chemistry.network import CONVERSION, ReactionNetwork
+from agents.chemistry.network import ReactionNetwork
 from agents.chemistry.reactor import POINTS_PER_BIN, Course, Reactor
 from agents.continuous.agent import ContinuousAgent
 from agents.continuous.outputs import at_edges, wrong_outputs
@@ -28,7 +28,8 @@ class Mistakes:
         molecules: int64 (M,), molecules per input spike.
         stochastic: int64 (M, trials), one run of each trial.
         deterministic: int64 (trials,), with infinitely many molecules.
-        neuron: int64 (trials,), of the continuous neuron itself (C → ∞ as well).
+        neuron: int64 (trials,), of the continuous neuron itself: C → ∞ as well, unless it is a
+            `ReactingGNM`.
     """
 
     molecules: NDArray[np.int64]
@@ -44,13 +45,13 @@ def count_mistakes(
     molecules: Sequence[int] = MOLECULES,
     trials: int = 100,
     seed: int = 0,
-    conversion: float = CONVERSION,
+    conversion: float | None = None,
     progress: Callable[[], None] | None = None,
 ) -> Mistakes:
     """Run `trials` trials, drawn from `seed`, for each number of molecules.
 
-    `progress` is called after each trial. Raises ValueError and ImportError as `ReactionNetwork`
-    and `Reactor` do.
+    `conversion` is that of `ReactionNetwork.from_agent`; `progress` is called after each trial.
+    Raises ValueError and ImportError as `ReactionNetwork` and `Reactor` do.
     """
     numbers = [whole("molecules", m, low=1) for m in molecules]
     trials = whole("trials", trials, low=1)

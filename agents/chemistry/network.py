@@ -55,8 +55,12 @@ class ReactionNetwork:
             object.__setattr__(self, name, real(name, getattr(self, name), above=0.0))
 
     @classmethod
-    def from_agent(cls, agent: Any, conversion: float = CONVERSION) -> ReactionNetwork:
-        """The network of a trained ContinuousAgent with η = 0; ValueError for any other agent."""
+    def from_agent(cls, agent: Any, conversion: float | None = None) -> ReactionNetwork:
+        """The network of a trained ContinuousAgent with η = 0; ValueError for any other agent.
+
+        `conversion` None is that of a `ReactingGNM`, which then does in the network what it was
+        trained to do, and else 10 per bin.
+        """
         neuron = getattr(agent, "neuron", None)
         if not isinstance(neuron, ContinuousGNM):
             raise ValueError(
@@ -68,6 +72,8 @@ class ReactionNetwork:
                 f"chemistry needs a neuron with eta = 0, got eta = {neuron.eta:g}: "
                 "the decay by R is no simple reaction; train with eta=0"
             )
+        if conversion is None:
+            conversion = getattr(neuron, "conversion", CONVERSION)
         return cls(agent.weights, neuron.alpha, conversion, neuron.theta_r)
 
     @property

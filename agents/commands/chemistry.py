@@ -39,8 +39,8 @@ def options(parser: Parser) -> None:
     add("--export", type=Path, metavar="FILE",
         help="write the network with the shown input: SBML, or Antimony if FILE ends in .ant or "
         ".txt; `molecules` is set to the first of --molecules")
-    add("--conversion", type=float, default=CONVERSION, metavar="C",
-        help=f"rate at which input molecules react, per bin (default {CONVERSION:g})")
+    add("--conversion", type=float, metavar="C", help="rate at which input molecules react, per "
+        f"bin (default {CONVERSION:g}, or that of --neuron reacting)")
     share(parser, "--runs", default=10, help="stochastic runs each")
     add("--trials", type=at_least(0), default=0, metavar="T",
         help="count wrong outputs over T trials for 10 … 2,000 molecules (default: do not)")

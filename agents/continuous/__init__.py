@@ -2,6 +2,7 @@
 
 from agents.continuous.agent import ContinuousAgent
 from agents.continuous.neuron import ContinuousGNM
+from agents.continuous.reacting import ReactingGNM
 from agents.continuous.reference import reference
 from agents.continuous.simulate import InputSpikes, Trajectory, simulate
 
@@ -9,6 +10,7 @@ __all__ = [
     "ContinuousAgent",
     "ContinuousGNM",
     "InputSpikes",
+    "ReactingGNM",
     "Trajectory",
     "reference",
     "simulate",

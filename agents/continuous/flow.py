@@ -12,6 +12,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from agents.neurons.gnm import REAL, WHOLE, hill_template
 from agents.neurons.gnm import Parameters as Rates
 from gnm_env.compiled import compiled, specialise
@@ -37,6 +40,7 @@ class Between(NamedTuple):
 
     V: float
     R: float
+    """The reset variable; where input takes time to react, what waits."""
     S: float
 
 
@@ -163,3 +167,48 @@ def flow(
                 V, R, gained, left = _step(rates, static, V, R, left)
                 S += gained
     return Between(V, R, S)
+
+
+# --- through a whole input -----------------------------------------------------------------------
+
+
+@compiled
+def lift(state: Between, jump: float) -> Between:
+    """An input spike adds to V at once."""
+    return Between(state.V + jump, state.R, 0.0)
+
+
+def walk_template(
+    numbers: Any,
+    static: tuple[int, ...],
+    jumps: NDArray[np.float64],
+    times: NDArray[np.float64],
+    at: NDArray[np.float64],
+    steps_per_bin: int,
+    course: NDArray[np.float64],
+) -> None:
+    """V, R and S at the times `at` into `course`, from event to event.
+
+    An event is an input spike, of which `jumps` holds the weight, or a time to report at. A neuron
+    with another course than `flow` and `lift` give binds its own in their place.
+    """
+    state = Between(0.0, 0.0, 0.0)
+    now = 0.0
+    S = 0.0
+    spike = 0
+    for k in range(at.size):
+        while spike < times.size and times[spike] <= at[k]:
+            state = flow(numbers, static, state.V, state.R, times[spike] - now, steps_per_bin)
+            S += state.S
+            now = times[spike]
+            state = lift(state, jumps[spike])
+            spike += 1
+        state = flow(numbers, static, state.V, state.R, at[k] - now, steps_per_bin)
+        S += state.S
+        now = at[k]
+        course[0, k] = state.V
+        course[1, k] = state.R
+        course[2, k] = S
+
+
+walk = specialise(walk_template, "continuous")

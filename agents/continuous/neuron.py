@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from agents.continuous.flow import CLOSED_FORM, SMOOTH, SMOOTH_WHOLE, STEP, Rates
+from agents.continuous.flow import CLOSED_FORM, SMOOTH, SMOOTH_WHOLE, STEP, Rates, walk
 from agents.continuous.steps import STEPS, Parameters, State
 from agents.neurons.gnm import GNM, LARGEST_WHOLE
 from agents.neurons.neuron import Neuron, PSPKernel
@@ -94,6 +94,10 @@ class ContinuousGNM(Neuron):
 
     def compiled_step(self) -> tuple[str, Any]:
         return STEPS[self.eta == 0.0]
+
+    def compiled_walk(self) -> tuple[Any, Any]:
+        """The walk through input spikes at any times, and the numbers that it takes."""
+        return walk, self.rates()
 
     def psp_kernel(self) -> PSPKernel:
         """The response to one unit spike, right after the input of each bin: e^−(1−η)α a bin."""

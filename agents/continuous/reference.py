@@ -25,8 +25,13 @@ def reference(
 
     The solver starts anew at every input spike, and where V falls through ϑ_R (the rate of S jumps)
     or, for an infinite exponent, through ϑ_B (that of R does), so that it never steps over a jump.
-    Raises ValueError as `simulate` does, RuntimeError if the solver fails.
+    Raises ValueError as `simulate` does and for a `ReactingGNM`, RuntimeError if the solver fails.
     """
+    if type(neuron) is not ContinuousGNM:
+        raise ValueError(
+            "reference takes a ContinuousGNM, whose input acts at once, got "
+            f"{type(neuron).__name__}; use simulate, which is exact for it"
+        )
     w, times = checked_weights(weights, spikes.n_inputs), report_times(spikes, at)
     course = np.empty((3, times.size))
     y = np.zeros(3)  # V, R, S

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.continuous.flow import STEPS_PER_BIN, Between, Rates, flow
+from agents.continuous.flow import STEPS_PER_BIN
 from agents.continuous.neuron import ContinuousGNM
 from gnm_env.checks import real, whole
-from gnm_env.compiled import compiled
 from gnm_env.trial import Trial
 
 
@@ -85,7 +84,8 @@ class Trajectory:
     Attributes:
         t: times in bins, ascending.
         V: membrane potential; at the time of an input spike, right after it.
-        R: the neuron's own reset variable; 0 throughout for η = 0, where it has no effect.
+        R: the neuron's own reset variable; 0 throughout for η = 0, where it has no effect. Of a
+            `ReactingGNM` what waits to become potential.
         S: ∫ Θ(V − ϑ_R) V dt from 0 to t.
     """
 
@@ -111,7 +111,9 @@ def simulate(
     w, times = checked_weights(weights, spikes.n_inputs), report_times(spikes, at)
     steps = whole("steps_per_bin", steps_per_bin, low=1)
     course = np.empty((3, times.size))
-    _walk(neuron.rates(), neuron.static(), w, spikes.times, spikes.channels, times, steps, course)
+    walk, numbers = neuron.compiled_walk()
+    jumps = w[spikes.channels]
+    walk(numbers, neuron.static(), jumps, spikes.times, times, steps, course)
     return Trajectory(times, *course)
 
 
@@ -136,34 +138,3 @@ def report_times(spikes: InputSpikes, at: ArrayLike | None) -> NDArray[np.float6
             f"the times to report at must be ascending and lie in 0 … {spikes.duration:g}"
         )
     return times
-
-
-@compiled
-def _walk(
-    rates: Rates,
-    static: tuple[int, ...],
-    weights: NDArray[np.float64],
-    times: NDArray[np.float64],
-    channels: NDArray[np.int64],
-    at: NDArray[np.float64],
-    steps_per_bin: int,
-    course: NDArray[np.float64],
-) -> None:
-    """From event to event, an event being an input spike or a time to report at."""
-    state = Between(0.0, 0.0, 0.0)
-    now = 0.0
-    S = 0.0
-    spike = 0
-    for k in range(at.size):
-        while spike < times.size and times[spike] <= at[k]:
-            state = flow(rates, static, state.V, state.R, times[spike] - now, steps_per_bin)
-            S += state.S
-            now = times[spike]
-            state = Between(state.V + weights[channels[spike]], state.R, 0.0)
-            spike += 1
-        state = flow(rates, static, state.V, state.R, at[k] - now, steps_per_bin)
-        S += state.S
-        now = at[k]
-        course[0, k] = state.V
-        course[1, k] = state.R
-        course[2, k] = S

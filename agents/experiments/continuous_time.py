@@ -54,27 +54,27 @@ def two_classes(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     )
 
 
-def trained(setting: dict[str, Any]) -> tuple[ContinuousAgent, Task, Patterns]:
-    """The continuous neuron that a setting describes, at the end of training."""
+def trained(
+    setting: dict[str, Any], neuron: ContinuousGNM
+) -> tuple[ContinuousAgent, Task, Patterns]:
+    """`neuron` at the end of the training that a setting describes."""
     classes, pattern_seed = setting["classes"], setting["pattern_seed"]
     task = Task(n_classes=classes)
     patterns = Patterns.draw(task, pattern_seed)
-    agent = untrained(setting["alpha"], pattern_seed)
+    agent = untrained(neuron, pattern_seed)
     seed = training_seed(classes, pattern_seed)
     train_many([agent], task, patterns, setting["trials"], seed, threads=1)
     return agent, task, patterns
 
 
-def untrained(alpha: float, pattern_seed: int) -> ContinuousAgent:
+def untrained(neuron: ContinuousGNM, pattern_seed: int) -> ContinuousAgent:
     """The neuron as it begins."""
-    return ContinuousAgent(
-        ContinuousGNM(alpha=alpha), AggregateLabel(), Task().n_inputs, seed=pattern_seed
-    )
+    return ContinuousAgent(neuron, AggregateLabel(), Task().n_inputs, seed=pattern_seed)
 
 
 def _train(block: Block) -> dict[str, NDArray[Any]]:
     (setting,) = block.settings
-    agent, _, patterns = trained(setting)
+    agent, _, patterns = trained(setting, ContinuousGNM(alpha=setting["alpha"]))
     amounts = outputs_alone(agent, patterns)
     return {
         "S": amounts.reshape(*block.shape, -1),
@@ -120,7 +120,7 @@ CLAIMS = (
 
 
 def first_stored(results: xr.Dataset) -> tuple[xr.Dataset, Task, Patterns]:
-    """The first pattern seed that is stored, whatever its neuron does, its task and patterns."""
+    """The first pattern seed of `results`, its task and patterns."""
     data = results.isel(classes=0, pattern_seed=0)
     task = Task(n_classes=int(data["classes"]))
     return data, task, Patterns.draw(task, int(data["pattern_seed"]))
@@ -128,9 +128,10 @@ def first_stored(results: xr.Dataset) -> tuple[xr.Dataset, Task, Patterns]:
 
 def _draw_first(results: Results) -> Figure:
     data, task, patterns = first_stored(results["F2"])
-    neuron = untrained(data.attrs["settings"]["common"]["alpha"], int(data["pattern_seed"]))
-    neuron.weights = data["weights"].to_numpy()
-    return draw(neuron, task, patterns)
+    neuron = ContinuousGNM(alpha=data.attrs["settings"]["common"]["alpha"])
+    agent = untrained(neuron, int(data["pattern_seed"]))
+    agent.weights = data["weights"].to_numpy()
+    return draw(agent, task, patterns)
 
 
 def draw(agent: ContinuousAgent, task: Task, patterns: Patterns) -> Figure:

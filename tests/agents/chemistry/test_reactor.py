@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agents.chemistry import Course, ReactionNetwork, Reactor
-from agents.continuous import ContinuousGNM, InputSpikes, simulate
+from agents.continuous import ContinuousGNM, InputSpikes, ReactingGNM, simulate
 from tests.marks import timed
 
 pytest.importorskip("roadrunner")
@@ -34,6 +34,16 @@ def test_the_deterministic_network_is_the_solution_of_its_linear_equations() -> 
     course = Reactor(NETWORK).deterministic(SPIKES, points_per_bin=10)
     assert course.V.shape == course.t.shape == (121,)
     np.testing.assert_allclose(course.V, chance(NETWORK, course.t).sum(1), atol=1e-7)
+
+
+def test_the_deterministic_network_is_the_neuron_that_reacts_as_it_does() -> None:
+    course = Reactor(NETWORK).deterministic(SPIKES, points_per_bin=500)
+    neuron = ReactingGNM(alpha=NETWORK.alpha, conversion=NETWORK.conversion, theta_r=0.5)
+    exact = simulate(neuron, NETWORK.weights, SPIKES, course.t)
+    np.testing.assert_allclose(course.V, exact.V, atol=1e-7)
+    fine = replace(course, theta_r=0.5).S()
+    assert fine[-1] > 0.5
+    np.testing.assert_allclose(fine, exact.S, atol=0.01)
 
 
 def test_the_network_approaches_the_neuron_as_one_over_C() -> None:
