@@ -151,7 +151,7 @@ class ReactingGNM(ContinuousGNM):
     name: ClassVar[str] = "reacting"
     parameters_type: ClassVar[type] = Parameters
     state_type: ClassVar[type] = State
-    widest: ClassVar[int] = 1  # type: ignore[misc]
+    widest: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()
