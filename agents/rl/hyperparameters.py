@@ -13,7 +13,7 @@ import math
 import os
 import tomllib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +131,11 @@ def _rollout(n_envs: int, bins: int, minibatches: int | None) -> dict[str, Any]:
 HYPERPARAMETERS: dict[str, Hyperparameters] = read_hyperparameters()
 
 
+def _chosen(kind: str, observation: ObservationConfig | None) -> Hyperparameters:
+    chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
+    return chosen if observation is None else replace(chosen, observation=observation)
+
+
 def training_env(
     task: Task | Trials,
     patterns: Patterns | None = None,
@@ -138,6 +143,7 @@ def training_env(
     *,
     feedback: str = "cost",
     n_envs: int | None = None,
+    observation: ObservationConfig | None = None,
 ) -> VecEnv:
     """PatternTrial environments side by side, as SB3 takes them, seen as `kind` needs it.
 
@@ -146,8 +152,9 @@ def training_env(
         kind: a key of `HYPERPARAMETERS`.
         feedback: "cost" or "dense", see `PatternTrialEnv`.
         n_envs: their number; None: the kind's.
+        observation: what is shown; None: the kind's. `make_rl_agent` has to be told the same.
     """
-    chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
+    chosen = _chosen(kind, observation)
     choice("feedback", feedback, ("cost", "dense"))
     source = source_of(task, patterns)  # refuses what does not belong together
     heard = (
@@ -175,6 +182,7 @@ def make_rl_agent(
     seed: int = 0,
     *,
     spike_probability: float = 0.01,
+    observation: ObservationConfig | None = None,
     **settings: Any,
 ) -> BaseAlgorithm:
     """An SB3 model, ready to `learn`, with the settings that this task needs.
@@ -216,13 +224,14 @@ def make_rl_agent(
         seed: of the initial weights, of exploration and of the stream.
         spike_probability: at the start, per bin, between 0 and 1. Not for DQN, which begins with
             10,000 random answers to fill its buffer and then prefers silence.
+        observation: what it is shown; None: the kind's.
         settings: keywords of SB3's class, which override the kind's.
 
     Raises:
         ValueError: an unknown kind, a probability outside (0, 1), or an environment that does not
             show what this kind needs or takes amounts for actions.
     """
-    chosen = HYPERPARAMETERS[choice("kind", kind, tuple(HYPERPARAMETERS))]
+    chosen = _chosen(kind, observation)
     p = real("spike_probability", spike_probability, 0.0, 1.0, above=0.0)
     if p == 1.0:
         raise ValueError("spike_probability must be < 1, got 1.0")

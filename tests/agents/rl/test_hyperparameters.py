@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import gymnasium as gym
@@ -15,7 +16,14 @@ import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import A2C, DQN, PPO
 
-from agents.rl import HYPERPARAMETERS, TRACES, make_rl_agent, read_hyperparameters, training_env
+from agents.rl import (
+    HYPERPARAMETERS,
+    TRACES,
+    ObservationConfig,
+    make_rl_agent,
+    read_hyperparameters,
+    training_env,
+)
 from agents.rl.hyperparameters import FILE, n_parameters
 from gnm_env import Patterns, Task
 
@@ -123,6 +131,16 @@ def test_bad_input_is_refused_with_a_remedy(call, message):
 def test_the_target_network_of_a_dqn_does_not_count():
     model = make_rl_agent("dqn", training_env(TASK, PATTERNS, "dqn", n_envs=2))
     assert n_parameters(model) == 102 * 64 + 64 + 64 * 64 + 64 + 64 * 2 + 2
+
+
+def test_a_kind_can_be_shown_something_else():
+    shown = ObservationConfig(decays=(1.0,), previous_action=True)
+    env = training_env(TASK, PATTERNS, "a2c", n_envs=2, observation=shown)
+    model = make_rl_agent("a2c", env, observation=shown)
+    assert model.observation_config == asdict(shown)
+    assert model.observation_space.shape == (TASK.n_inputs + 1,)
+    with pytest.raises(ValueError, match="a2c needs ObservationConfig"):
+        make_rl_agent("a2c", env)
 
 
 def test_every_kind_gives_its_reasons():
