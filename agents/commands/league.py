@@ -41,7 +41,7 @@ SETTINGS, SCORES = "settings.json", "scores.json"
 
 def options(parser: Parser) -> None:
     add = parser.add_argument
-    share(parser, "--size", choices=("quick", "full"))
+    share(parser, "--size", choices=("quick", "full"), default=None, help="(default quick)")
     add(
         "--part",
         choices=(*PARTS, RULES),
@@ -61,7 +61,7 @@ def options(parser: Parser) -> None:
     add("--epochs", type=at_least(1), metavar="N", help="of --trials: how "
         f"often each trial is heard (default {own_data.EPOCHS})")  # fmt: skip
     share(parser, "--seed", help="of --trials: of the split and of all that is drawn")
-    add("--jobs", type=at_least(1), default=1, metavar="N", help="trainings at a time (default 1)")
+    add("--jobs", type=at_least(1), metavar="N", help="trainings at a time (default 1)")
     add("--steps", type=at_least(1), metavar="N", help="bins that RL agents hear, to try it out")
     share(parser, "--out", help=f"(default {RESULTS}/league/SIZE)")
     add("--so-far", action="store_true", help="train nothing: print and draw what is finished")
@@ -76,6 +76,7 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     for name in ("by", "epochs"):
         if getattr(options, name) is not None:
             raise ValueError(f"--{name} belongs to --trials FILE: add it, or leave --{name} out")
+    options.size = options.size or "quick"
     folder = options.out or RESULTS / "league" / options.size
     chosen_rows = options.rules is not None or options.neurons is not None
     parts = options.part or ([RULES] if chosen_rows or options.tune else PARTS)
@@ -86,7 +87,7 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     # Wrong names are told before anything is trained.
     names = ranking.rows_of(options.neurons, options.rules) if RULES in parts else []
     if not options.so_far:
-        with _processes(options.jobs) as executor:
+        with _processes(options.jobs or 1) as executor:
             for part in parts:
                 if part == RULES:
                     _rank(options, folder, names, executor)
@@ -112,7 +113,8 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
 
 def _on_trials(options: argparse.Namespace) -> dict[str, Any]:
     """Rank neurons and rules on a data set, print the table and keep it."""
-    for name in ("part", "seeds", "tune", "steps", "so_far", "keep", "repair"):
+    of_streams = ("part", "seeds", "tune", "steps", "so_far", "keep", "repair", "size", "jobs")
+    for name in of_streams:
         if getattr(options, name):
             word = name.replace("_", "-")
             raise ValueError(

@@ -80,6 +80,8 @@ def test_the_command_ranks_a_file_and_keeps_the_table(tmp_path: Path) -> None:
         (["--epochs", 3], "--epochs belongs to --trials"),
         (["--trials", "mine.npz", "--so-far"], "--so-far is of the league on drawn streams"),
         (["--trials", "mine.npz", "--part", "rl"], "--part is of the league on drawn streams"),
+        (["--trials", "mine.npz", "--jobs", 1], "--jobs is of the league on drawn streams"),
+        (["--trials", "mine.npz", "--size", "quick"], "--size is of the league on drawn"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(words: list[Any], why: str) -> None:
