@@ -53,6 +53,8 @@ def _placed(folder: Path, out: Path, same_as: Path | None) -> dict[str, Any]:
     """Place the agents of a folder in the league; compare two folders, if there is another."""
     from agents.suite.placing import place
 
+    # First: what cannot be read is told before anything is printed.
+    differences = None if same_as is None else differing(folder, same_as)
     placing = place(folder)
     print(placing.text())
     pictures = placing.draw(out)
@@ -62,8 +64,7 @@ def _placed(folder: Path, out: Path, same_as: Path | None) -> dict[str, Any]:
         "notes": list(placing.notes),
         "pictures": [str(path) for path in pictures],
     }
-    if same_as is not None:
-        differences = differing(folder, same_as)
+    if differences is not None:
         lines = differences or [f"{folder} and {same_as} hold the same scores, bin by bin"]
         print("\n".join(lines))
         told |= {"differences": differences, "failed": bool(differences)}
