@@ -6,9 +6,10 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 from agents.experiments.figures import FORMATS, draw
-from agents.experiments.heat_maps import draw_one_class
+from agents.experiments.heat_maps import draw_one_class, sides
 from agents.experiments.listing import experiments, pictures
 from agents.experiments.residuals import draw_residuals
 from agents.plotting import MAP, save, styled
@@ -42,7 +43,32 @@ def test_every_axis_has_a_label_with_units(results: dict[str, xr.Dataset]) -> No
         figure = draw_one_class(results, "matched")
     labels = {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())}
 
-    assert labels == {"η (model choice)", "α (decay per bin)", "noisy performance (bins)", ""}
+    assert labels == {
+        "η (model choice)",
+        "α (decay per bin)",
+        "noisy performance (bins)",
+        "mistakes per 1,000 bins",
+        "",
+    }
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_the_papers_own_numbers_stand_beside_ours(results: dict[str, xr.Dataset]) -> None:
+    with styled():
+        one = PICTURES["F3"].draw(results)
+        more = PICTURES["F4"].draw(results)
+    assert texts(one).count("paper 377") == 2
+    assert texts(more).count("paper 200") == 1
+    assert sum(text.startswith("MST ") for text in texts(more)) == 6
+
+
+def test_names_on_a_colour_bar_do_not_hide_each_other() -> None:
+    assert sides([0.6, 0.8]) == ["right", "left"]
+    assert sides([0.05, 0.9]) == ["left", "right"]
+    assert sides([0.5]) == ["center"]
 
 
 def test_a_best_line_at_the_end_of_the_range_is_said_in_the_caption(
