@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 
 from agents.experiments.figures import FORMATS, draw
 from agents.experiments.heat_maps import draw_one_class, sides
-from agents.experiments.listing import experiments, pictures
+from agents.experiments.listing import claims, experiments, pictures
 from agents.experiments.residuals import draw_residuals
 from agents.plotting import MAP, save, styled
 from tests.agents.experiments.worlds import as_in_the_paper, world
 
 PICTURES = pictures()
-SCORED = ("F1", "F3", "F3-wide", "F4", "F5", "LINES", "F6", "F7", "BP", "CONDITIONS", "table")
+SCORED = ("F1", "F3", "F3-wide", "F4", "F5", "LINES", "F6", "F7", "BP", "CONDITIONS", "NEURONS")
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,8 @@ def test_the_papers_own_numbers_stand_beside_ours(results: dict[str, xr.Dataset]
         more = PICTURES["F4"].draw(results)
     assert texts(one).count("paper 377") == 2
     assert texts(more).count("paper 200") == 1
-    assert sum(text.startswith("MST ") for text in texts(more)) == 6
+    # NEURONS has no four classes at quick size.
+    assert sum(text.startswith("MST ") for text in texts(more)) == 4
 
 
 def test_names_on_a_colour_bar_do_not_hide_each_other() -> None:
@@ -130,10 +131,10 @@ def test_grey_printing_keeps_the_order_of_the_scores() -> None:
     assert np.all(np.diff(lightness) > 0)
 
 
-def test_every_experiment_is_in_a_figure_or_beside_one() -> None:
-    drawn = {need for picture in PICTURES.values() for need in picture.needs}
+def test_every_experiment_is_drawn_or_judged() -> None:
+    used = {need for one in (*PICTURES.values(), *claims()) for need in one.needs}
 
-    assert set(experiments()) <= drawn
+    assert set(experiments()) <= used
 
 
 def test_a_folder_that_cannot_be_made_is_an_error(results: dict[str, xr.Dataset]) -> None:
