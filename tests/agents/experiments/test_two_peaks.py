@@ -9,6 +9,7 @@ import xarray as xr
 
 from agents.experiments.store import read
 from agents.experiments.two_peaks import (
+    ARC_SEED,
     AROUND,
     PICTURES,
     deepest,
@@ -41,7 +42,7 @@ def test_a_dip_is_what_both_neighbours_are_ahead_by() -> None:
     scores[1, 4], scores[0, 5:] = 300.0, 2_000.0  # a dip, and a fall that is none
     assert dips(scores).max() == 8_700.0
     assert dips(scores)[0].max() <= 0.0
-    assert deepest(scores) == (1, 4)
+    assert deepest(scores)[1] == 4
     assert dips(scores).shape == (2, 9 - 2 * AROUND)
 
 
@@ -50,10 +51,10 @@ def test_the_arc_of_the_map_is_one_seed_whose_two_peaks_are_level(
 ) -> None:
     data = stored["PEAKS"]
     scores = data["survived"].mean("run").sel(classes=1).transpose("pattern_seed", "alpha")
-    seed, place = deepest(scores.to_numpy())
-    assert (int(data["pattern_seed"][seed]), float(data["alpha"][place])) == (3, 0.525)
-    assert second_peaks(data)[seed, place] > 0.99
-    before, after = (potential(data, 3, alpha).argmax() - GAP for alpha in (0.475, 0.575))
+    place = deepest(scores.to_numpy())[ARC_SEED]
+    assert float(data["alpha"][place]) == 0.525
+    assert second_peaks(data)[ARC_SEED, place] > 0.99
+    before, after = (potential(data, ARC_SEED, alpha).argmax() - GAP for alpha in (0.475, 0.575))
     assert (before, after) == (3, 24)
 
 
