@@ -6,8 +6,9 @@
     gnm publish --forensics --size paper   what gnm forensics found, in docs/forensics
     gnm publish --size paper --merge       only what was judged anew; all else stays
 
-Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, and with
---stores one zip per experiment. Unpacked into results/SIZE/NAME, it is the store that it was.
+Each size has a folder of its own: claims.md, claims.json, figures/NAME.png and .pdf, the forest
+plots of single claims, and with --stores one zip per experiment. Unpacked into results/SIZE/NAME,
+it is the store that it was.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import argparse
 import json
 import shutil
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ from agents.commands.forensics import FORENSICS
 from agents.commands.terminal import REPORT, RESULTS, Parser, share
 from agents.experiments import forensics_page
 from agents.experiments.former_names import standing
+from agents.experiments.report import FORESTS
 from agents.experiments.store import read
 from agents.experiments.verdict import MISSING
 
@@ -84,15 +86,18 @@ def main(options: argparse.Namespace) -> dict[str, Any]:
     stores = [store["name"] for store in found["stores"]] if options.stores else []
     if options.merge:
         found = merged(kind, told(kind, target, options.size), found)
-    text = forensics_page.page(found) if kind is SOUGHT else page(kind, found)
     with replaced(target) as fresh:
-        for part in ("figures", "stores"):
+        for part in ("figures", FORESTS, "stores"):
             if options.merge and (target / part).exists():
                 shutil.copytree(target / part, fresh / part)
-        (fresh / "figures").mkdir(exist_ok=True)
-        for suffix in KEPT:
-            for picture in sorted((report / "figures").glob(f"*.{suffix}")):
-                shutil.copy(picture, fresh / "figures")
+        for part, kept in (("figures", KEPT), (FORESTS, ("svg",))):
+            pictures = [p for suffix in kept for p in sorted((report / part).glob(f"*.{suffix}"))]
+            if pictures:
+                (fresh / part).mkdir(exist_ok=True)
+            for picture in pictures:
+                shutil.copy(picture, fresh / part)
+        drawn = frozenset(path.stem for path in (fresh / FORESTS).glob("*.svg"))
+        text = forensics_page.page(found) if kind is SOUGHT else page(kind, found, drawn)
         shutil.copy(report / f"{kind.name}.json", fresh)
         if options.merge:
             joined = json.dumps(found, indent=1, ensure_ascii=False)
@@ -166,8 +171,11 @@ def merged(kind: Kind, kept: dict[str, Any], found: dict[str, Any]) -> dict[str,
     return joined
 
 
-def page(kind: Kind, found: dict[str, Any]) -> str:
-    """The claims or findings as Markdown: what was found, the verdicts, and what it took."""
+def page(kind: Kind, found: dict[str, Any], forests: Set[str] = frozenset()) -> str:
+    """The claims or findings as Markdown: what was found, the verdicts, and what it took.
+
+    `forests` are the ids that have a forest plot beside the page.
+    """
     about = "../../reproduction.md" if kind is CLAIMS else "../../findings.md"
     lines = [
         f"# The {kind.name} at {found['size']} size",
@@ -178,7 +186,7 @@ def page(kind: Kind, found: dict[str, Any]) -> str:
         f"| {'claim' if kind is CLAIMS else 'expected'} | in short | found | verdict |",
         "|---|---|---|---|",
         *(
-            _row(row["id"], row["words"], "<br>".join(row["numbers"]), f"**{row['verdict']}**")
+            _row(row["id"], row["words"], _numbers(row, forests), f"**{row['verdict']}**")
             for row in found[kind.name]
         ),
         "",
@@ -191,6 +199,12 @@ def page(kind: Kind, found: dict[str, Any]) -> str:
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _numbers(row: Mapping[str, Any], forests: Set[str]) -> str:
+    """What was found, and its forest plot where there is one."""
+    plot = [f"![{row['id']}: ours beside the paper's]({FORESTS}/{row['id']}.svg)"]
+    return "<br>".join([*row["numbers"], *(plot if row["id"] in forests else [])])
 
 
 def _pictures(captions: Mapping[str, str]) -> list[str]:

@@ -27,7 +27,7 @@ from agents.experiments.forensics import (
     conditions,
 )
 from agents.experiments.forest import draw_forest
-from agents.experiments.statistics import Interval, Wins, bootstrap, mean, wins
+from agents.experiments.statistics import Interval, bootstrap, mean, wins
 from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import WIDE, letter, panels
 
@@ -122,18 +122,14 @@ def _three_class_ratio(scores: Array) -> tuple[Interval, bool, str]:
     return first, holds, f"ratio {first:.2f} at 0; 25 bins over none {fall:.2f}"
 
 
-def _share(found: Wins) -> Interval:
-    return Interval(found.share, found.low, found.high)
-
-
 def _mst_ahead(scores: Array) -> tuple[Interval, bool, str]:
     found = wins(_column(scores, "MST 2"), _column(scores, "GNM 2"))
-    return _share(found), found.share <= 0.16 and found.p < ALPHA, f"MST ahead in {found}"
+    return found.interval, found.share <= 0.16 and found.p < ALPHA, f"MST ahead in {found}"
 
 
 def _et_ahead(scores: Array) -> tuple[Interval, bool, str]:
     found = wins(_column(scores, "ET 2"), _column(scores, "GNM 2"))
-    return _share(found), found.share >= 0.8 and found.p < ALPHA, f"ET ahead in {found}"
+    return found.interval, found.share >= 0.8 and found.p < ALPHA, f"ET ahead in {found}"
 
 
 def _claim(

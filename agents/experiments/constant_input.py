@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agents import GNM, AggregateLabel, NeuronAgent, Recording, record
 from agents.experiments.design import Axis, Block, Experiment, Variable
 from agents.experiments.figures import Picture
+from agents.experiments.response import described, draw_response
 from agents.experiments.verdict import Claim, Finding, Results
 from agents.plotting import BLUE, GREY, INK, RED, WIDE, letter, panels, styled
 from gnm_env import Task, Trial
@@ -165,6 +166,50 @@ def draw(weak: Recording, strong: Recording) -> Figure:
     return figure
 
 
+def _draw_all(results: Results) -> Figure:
+    """The model, a trained neuron's response, and the neuron under constant input."""
+    figure, grid = panels(2, 2, width=WIDE, height=4.9)
+    weak, strong = stored(results["F1"])
+    _draw_model(grid[0, 0])
+    letter(grid[0, 0], "a")
+    draw_response(grid[0, 1], results["F1b"])
+    letter(grid[0, 1], "b")
+    _draw_potential(grid[1, 0], weak, strong)
+    _draw_loop(grid[1, 1], weak, strong)
+    return figure
+
+
+def _draw_model(axes: Axes) -> None:
+    """A schema: spike trains, weights, the neuron with its variables, its readout, output."""
+    axes.set(xlim=(0, 10), ylim=(0, 6))
+    axes.set_axis_off()
+    trains = {"1": (5.1, (0.4, 1.3, 2.1)), "2": (3.9, (0.9, 1.1, 2.4)), "N": (1.2, (0.3, 1.7))}
+    for name, (height, spikes) in trains.items():
+        axes.plot((0.1, 2.7), (height, height), color=INK, lw=0.8)
+        axes.vlines(spikes, height, height + 0.5, color=BLUE, lw=1.4)
+        axes.annotate(
+            "", (4.35, 3.0 + 0.25 * (height - 3)), (2.7, height),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 0.8, "mutation_scale": 8},
+        )  # fmt: skip
+        middle = 0.5 * (height + 3.0 + 0.25 * (height - 3))
+        axes.text(3.5, middle + 0.18, f"$w_{name}$", ha="center", va="bottom")
+    axes.text(1.4, 2.45, "⋮", ha="center", va="center", fontsize=12)
+    axes.plot(5.6, 3.0, "o", ms=54, mfc="white", mec=INK, mew=1.2)
+    axes.text(5.6, 3.55, "$V$", ha="center", va="center", fontsize=10)
+    axes.text(5.6, 2.95, "$D(V, R)$", ha="center", va="center")
+    axes.text(5.6, 2.35, "$R$", ha="center", va="center")
+    axes.annotate(
+        "", (8.3, 3.0), (6.95, 3.0),
+        arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.0, "mutation_scale": 9},
+    )  # fmt: skip
+    axes.text(7.75, 3.2, r"$V\geq\vartheta_R$", ha="center", va="bottom", fontsize=7)
+    axes.plot((8.3, 10.0), (3.0, 3.0), color=INK, lw=0.8)
+    axes.vlines((8.8, 9.5), 3.0, 3.6, color=INK, lw=1.6)
+    axes.text(1.4, 0.35, "input spikes, N channels", ha="center", fontsize=7)
+    axes.text(5.6, 0.35, "generalised neuron", ha="center", fontsize=7)
+    axes.text(9.0, 0.35, "output spikes", ha="center", fontsize=7)
+
+
 def _draw_potential(axes: Axes, weak: Recording, strong: Recording) -> None:
     last = len(strong.V) - 1
     axes.plot(strong.V, color=INK, lw=1.1, label="super-threshold input")
@@ -197,13 +242,18 @@ def _draw_loop(axes: Axes, weak: Recording, strong: Recording) -> None:
 EXPERIMENTS = {"F1": two_levels}
 PICTURES = {
     "F1": Picture(
-        lambda results: draw(*stored(results["F1"])),
-        ("F1",),
-        "A neuron with η 0.8, α 0.3, β 0.1 under constant input. (c) Weak input (dashed) takes the "
-        "membrane potential to a plateau below the threshold; strong input makes it cross the "
-        "threshold, and R, which has opened, pulls it down again. (d) The decay D over V in one "
-        "such cycle: at the same V the neuron decays far faster on the way down than on the way "
-        "up, so it remembers that it has crossed. Under weak input (dashed) D is proportional to "
-        "V.",
+        _draw_all,
+        ("F1", "F1b"),
+        "(a) The model: weighted input spikes raise the membrane potential V; the decay D takes "
+        "from it, the more the more the recovery variable R has opened; V crossing the threshold "
+        "from below is an output spike. (b) A trained neuron (η 0, α 0.3) hears three patterns, "
+        "shaded, in noise; above, its output spikes. It owes one spike to class 0, two to class 1, "
+        "three to class 2 and none to noise. (c, d) A neuron with η 0.8, α 0.3, β 0.1 under "
+        "constant input. (c) Weak input (dashed) takes the membrane potential to a plateau below "
+        "the threshold; strong input makes it cross the threshold, and R, which has opened, pulls "
+        "it down again. (d) The decay D over V in one such cycle: at the same V the neuron decays "
+        "far faster on the way down than on the way up, so it remembers that it has crossed. Under "
+        "weak input (dashed) D is proportional to V.",
+        lambda results: described(results["F1b"]),
     )
 }

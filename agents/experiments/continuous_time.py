@@ -12,7 +12,7 @@ from agents.continuous import ContinuousAgent, ContinuousGNM, Trajectory
 from agents.continuous.outputs import course, outputs_alone, pattern_spikes
 from agents.experiments.design import Block, Experiment, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import median
+from agents.experiments.statistics import Interval, median
 from agents.experiments.training import (
     WEIGHTS,
     class_counts,
@@ -21,7 +21,7 @@ from agents.experiments.training import (
     stream_seeds,
     training_seed,
 )
-from agents.experiments.verdict import Claim, Finding, Results
+from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import BLUE, GREY, INK, WIDE, panels, styled
 from gnm_env import Patterns, Task
 
@@ -98,7 +98,12 @@ def _judge(results: Results) -> Finding:
         f"{PAPER[k]:g}"
         for k, found in enumerate(medians)
     )
-    return Finding(all(held), {}, numbers)
+    marks = tuple(
+        Mark(f"class {k}", Interval(*(end / (k + 1) for end in found)), held[k], PAPER[k] / (k + 1))
+        for k, found in enumerate(medians)
+    )
+    forest = Forest("median S / S owed", 1 - TOLERANCE, 1 + TOLERANCE, marks)
+    return Finding(all(held), {}, numbers, forest=forest)
 
 
 CLAIMS = (

@@ -19,6 +19,8 @@ MOST_OF_A_RATIO = 3.0
 def draw_forest(axes: Axes, forest: Forest, *, names: bool = True) -> None:
     """The band in which the claim holds, shaded; the paper's number, a line; ours, a row each.
 
+    A row with a number of the paper's own has a short line at it.
+
     Blue agrees, red does not. `names` says whether the rows are labelled.
     """
     values = [mark.value for mark in forest.marks]
@@ -38,6 +40,8 @@ def draw_forest(axes: Axes, forest: Forest, *, names: bool = True) -> None:
     if forest.at is not None:
         axes.axvline(forest.at, color=INK, lw=0.9)
     for row, mark in enumerate(forest.marks):
+        if mark.at is not None:
+            axes.vlines(mark.at, row - 0.4, row + 0.4, color=INK, lw=0.9)
         colour, inside = BLUE if mark.holds else RED, mark.value.value <= right
         if math.isfinite(mark.value.low):
             axes.hlines(row, mark.value.low, mark.value.high, color=colour, lw=1.2)
@@ -70,7 +74,12 @@ def described(forest: Forest) -> dict[str, Any]:
         "paper": plain(forest.at),
         "band": [plain(forest.low), plain(forest.high)],
         "ours": [
-            {"under": mark.label, "value": [plain(end) for end in mark.value], "holds": mark.holds}
+            {
+                "under": mark.label,
+                "value": [plain(end) for end in mark.value],
+                "holds": mark.holds,
+                **({} if mark.at is None else {"paper": mark.at}),
+            }
             for mark in forest.marks
         ],
     }

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.methods import GNM_ALL, LIF_ALL, initial_weights
-from agents.experiments.statistics import Interval, bootstrap, by_seed, score
+from agents.experiments.statistics import Interval, bootstrap, by_seed, rate, score
 from agents.experiments.training import STARTS, class_counts, learners, pattern_seeds, training
-from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
+from agents.experiments.verdict import Claim, Finding, Forest, Results, Tried, from_both_starts
 from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def fewer_mistakes(lif: NDArray[np.float64], gnm: NDArray[np.float64]) -> NDArra
 
     Seeds and runs are pooled, and half a mistake is added, so that a neuron without any has a rate.
     """
-    rates = [(part[..., 0].sum(0) + 0.5) / part[..., 1].sum(0) for part in (gnm, lif)]
+    rates = [rate(*part.sum(0).T) for part in (gnm, lif)]
     found: NDArray[np.float64] = rates[0] / rates[1]
     return found
 
@@ -112,9 +112,13 @@ def _judge_comparable(results: Results) -> Finding:
         values = ratio(*ratios(results["F6"], 1, start))
         held = bool(np.all((values >= COMPARABLE[0]) & (values <= COMPARABLE[1])))
         words = _ratio_words(start, *ratios(results["F6"], 1, start))
-        return Tried(held, f"{words}, all in {values.min():.2f} … {values.max():.2f}")
+        return Tried(
+            held,
+            f"{words}, all in {values.min():.2f} … {values.max():.2f}",
+            value=_ratio_at(0, *ratios(results["F6"], 1, start)),
+        )
 
-    return from_both_starts(judge)
+    return from_both_starts(judge, forest=Forest("LIF / GNM at 0 bins", *COMPARABLE, ()))
 
 
 def _judge_rise(results: Results) -> Finding:
@@ -128,19 +132,21 @@ def _judge_rise(results: Results) -> Finding:
             growth.above(1 + FLAT),
             f"{start}: the GNM errs {ends[0]:.2f} times as often as the LIF at 0, {ends[1]:.2f} "
             f"times at {REFRACTORY[-1]} bins; trend over {REFRACTORY[-1]} bins × {growth:.2f}",
+            value=growth,
         )
 
-    return from_both_starts(judge)
+    return from_both_starts(judge, forest=Forest("trend over 25 bins (×)", 1.0, 9.0, ()))
 
 
 def _judge_three_classes(results: Results) -> Finding:
     def judge(start: str) -> Tried:
         lif, gnm = ratios(results["F6"], 3, start)
         slope = bootstrap(_slope, lif, gnm)
-        held = _ratio_at(0, lif, gnm).below(1) and slope.below(-FLAT)
-        return Tried(held, _ratio_words(start, lif, gnm))
+        first = _ratio_at(0, lif, gnm)
+        held = first.below(1) and slope.below(-FLAT)
+        return Tried(held, _ratio_words(start, lif, gnm), value=first)
 
-    return from_both_starts(judge)
+    return from_both_starts(judge, forest=Forest("LIF / GNM at 0 bins", 0.0, 1.0, ()))
 
 
 _PROTOCOL = (

@@ -26,8 +26,10 @@ from agents.registry import load_module
 
 SUBJECTS = (
     "constant_input",
+    "response",
     "continuous_time",
     "heat_maps",
+    "two_peaks",
     "lines",
     "residuals",
     "lif_ratio",

@@ -12,7 +12,15 @@ from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.statistics import by_seed, mean, median, score, wins
 from agents.experiments.training import STARTS, class_counts, learners, pattern_seeds, training
-from agents.experiments.verdict import Claim, Finding, Results, Tried, from_both_starts
+from agents.experiments.verdict import (
+    Claim,
+    Finding,
+    Forest,
+    Mark,
+    Results,
+    Tried,
+    from_both_starts,
+)
 from agents.plotting import (
     BINS,
     BLUE,
@@ -119,20 +127,24 @@ def _judge_mst(results: Results) -> Finding:
     def judge(start: str) -> Tried:
         found = wins(*(paired(results["F7"], start, m) for m in ("MST, ALL", "GNM, ALL")))
         held = found.share <= 0.16 and found.p < ALPHA
-        return Tried(held, f"{start}: MST ahead of GNM in {found}")
+        return Tried(held, f"{start}: MST ahead of GNM in {found}", value=found.interval)
 
-    return from_both_starts(judge)
+    return from_both_starts(judge, forest=Forest("share of seeds", 0.0, 0.16, (), 3 / 50))
 
 
 def _judge_error_trace(results: Results) -> Finding:
-    held, words = {}, []
+    held, words, marks = {}, [], []
     for learner, name in ET_FORMS.items():
         for start in STARTS:
             found = wins(*(paired(results["F7"], start, m) for m in (learner, "GNM, ALL")))
             held[name, start] = found.share >= 0.8 and found.p < ALPHA
             words.append(f"{start}: {name} ahead of ALL in {found}")
+            marks.append(Mark(f"{start}, {name}", found.interval, held[name, start]))
     return Finding(
-        all(held["plain ET", start] for start in STARTS), _et_conditions(held), tuple(words)
+        all(held["plain ET", start] for start in STARTS),
+        _et_conditions(held),
+        tuple(words),
+        forest=Forest("share of seeds", 0.8, 1.0, tuple(marks), 46 / 50),
     )
 
 
@@ -218,20 +230,26 @@ CLAIMS = (
 
 
 def _draw(results: Results) -> Figure:
-    """Scores of all methods on two classes, seed by seed, and the paired differences."""
+    """Scores of all methods on two classes, seed by seed, and the paired ratios."""
     figure, grid = panels(2, 2, width=WIDE, height=5.4)
     for column, start in enumerate(STARTS):
         values = _by_method(results, start)
         _points(grid[0, column], values)
-        _differences(grid[1, column], values)
+        _ratios(grid[1, column], values)
         letter(grid[0, column], f"{'ab'[column]}   {start} initial weights")
         letter(grid[1, column], "cd"[column])
     grid[0, 0].set_ylabel(BINS)
-    grid[1, 0].set_ylabel("paired difference (bins)")
+    grid[1, 0].set_ylabel("paired ratio of scores")
     for row in grid:
+        # From the wide start most scores would lie in a line at the bottom of a linear axis.
+        for axes in row:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter("{x:,g}")
         low, high = min(a.get_ylim()[0] for a in row), max(a.get_ylim()[1] for a in row)
         for axes in row:
             axes.set_ylim(low, high)
+    for axes in grid[1]:
+        axes.set_ylim(top=axes.get_ylim()[1] * 2)  # room for the counts
     return figure
 
 
@@ -268,8 +286,8 @@ def _points(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) ->
     silent_line(axes, Task().silent_score)
 
 
-def _differences(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) -> None:
-    """Differences between methods on the same seed, mean with interval, and the count of wins."""
+def _ratios(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) -> None:
+    """Ratios of two methods on the same seed, geometric mean with interval, count of wins."""
     pairs = [
         ("MST, ALL", "GNM, ALL"),
         ("GNM, ET", "GNM, ALL"),
@@ -283,25 +301,24 @@ def _differences(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]
         a, b = _common(values[first], values[second])
         if not len(a):  # BP may have seeds of its own
             continue
-        difference, found = a - b, wins(a, b)
-        x = place + jitter.uniform(-0.2, 0.2, len(difference))
-        ahead = difference > 0
-        axes.plot(x[ahead], difference[ahead], "^", ms=3, color=BLUE, alpha=0.6, mew=0)
-        axes.plot(x[~ahead], difference[~ahead], "v", ms=3, color=RED, alpha=0.6, mew=0)
-        centre = mean(difference)
+        ratio, found = np.maximum(a, 1.0) / np.maximum(b, 1.0), wins(a, b)
+        x = place + jitter.uniform(-0.2, 0.2, len(ratio))
+        ahead = ratio > 1
+        axes.plot(x[ahead], ratio[ahead], "^", ms=3, color=BLUE, alpha=0.6, mew=0)
+        axes.plot(x[~ahead], ratio[~ahead], "v", ms=3, color=RED, alpha=0.6, mew=0)
+        centre = np.exp(mean(np.log(ratio)))
         axes.errorbar(
-            place + 0.33, centre.value, [[centre.value - centre.low], [centre.high - centre.value]],
+            place + 0.33, centre[0], [[centre[0] - centre[1]], [centre[2] - centre[0]]],
             fmt="D", ms=4, color=INK, mfc="white", lw=1.2,
         )  # fmt: skip
         axes.annotate(
             f"{found.wins}/{found.pairs}", (place, 0.99), xycoords=("data", "axes fraction"),
             ha="center", va="top", fontsize=7,
         )  # fmt: skip
-    axes.axhline(0, color=INK, lw=0.9, ls="--", zorder=1)
-    labels = [f"{_short(a)}\n− {_short(b)}" for a, b in shown]
+    axes.axhline(1, color=INK, lw=0.9, ls="--", zorder=1)
+    labels = [f"{_short(a)}\n/ {_short(b)}" for a, b in shown]
     axes.set_xticks(range(len(shown)), labels, fontsize=6)
     axes.set_xlim(-0.6, len(shown) - 0.4)
-    axes.margins(y=0.14)
 
 
 def _short(name: str) -> str:
@@ -342,9 +359,11 @@ PICTURES = {
     "F7": Picture(
         _draw,
         ("F7",),
-        "Two classes. (a, b) One point per pattern seed; bars are medians, diamonds means with 95 "
-        "% bootstrap intervals; dotted is what silence scores. (c, d) Differences between two "
-        "methods on the same patterns and streams; above, how often the first was ahead.",
+        "Two classes, logarithmic axes. (a, b) One point per pattern seed; bars are medians, "
+        "diamonds means with 95 % bootstrap intervals; dotted is what silence scores. (c, d) "
+        "Ratios of the scores of two methods on the same patterns and streams, diamonds their "
+        "geometric means with 95 % bootstrap intervals; above, how often the first was ahead. BP "
+        "has initial weights of its own, the same in both columns.",
     ),
     "F7-hidden": Picture(
         _draw_networks,

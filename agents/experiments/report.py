@@ -35,6 +35,8 @@ TEMPLATE = Path(__file__).parent / "report_template.html"
 _NONE: Mapping[str, str] = {}
 FORENSICS = "forensics"
 """Folder beside the page with what `gnm forensics` found."""
+FORESTS = "forests"
+"""Folder beside the page with the forest plots of single claims."""
 
 
 def _row(claim: Claim, results: Results, costs: Mapping[str, Summary], size: str) -> dict[str, Any]:
@@ -114,9 +116,8 @@ def page(
     )
     drawn = [figure["name"] for figure in figures]
     return environment.get_template(TEMPLATE.name).render(
-        **told,
+        {**told, "figures": figures},
         counts=Counter(row["kind"] for row in told["claims"]),
-        figures=figures,
         forests=forests,
         forensics=forensics,
         undrawn=[name for name in pictures() if name not in drawn],
@@ -161,6 +162,11 @@ def record(results: Results, costs: Mapping[str, Summary], size: str) -> dict[st
         "commit": commit(),
         "claims": [_row(claim, results, costs, size) for claim in claims()],
         "table": {n: [asdict(cell) for cell in cells] for n, cells in reference(results).items()},
+        "figures": {
+            name: picture.full_caption(results)
+            for name, picture in pictures().items()
+            if all(need in results for need in picture.needs)
+        },
         "stores": stores(costs),
     }
 
@@ -180,13 +186,13 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
     figures = [
         {
             "name": name,
-            "caption": pictures()[name].full_caption(results),
+            "caption": told["figures"][name],
             "source": _inline(paths["svg"]),
         }
         for name, paths in draw(pictures(), results, out / "figures").items()
     ]
     out.mkdir(parents=True, exist_ok=True)
-    forests = _forests(results, out / "forests")
+    forests = _forests(results, out / FORESTS)
     html = page(told, figures, forests, shown_forensics(out / FORENSICS, size))
     (out / "index.html").write_text(html, encoding="utf-8")
     text = json.dumps(told, indent=1, ensure_ascii=False)

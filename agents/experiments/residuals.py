@@ -17,7 +17,7 @@ from agents.experiments.figures import Picture
 from agents.experiments.heat_maps import ALPHA, CLASS_NAMES
 from agents.experiments.statistics import by_seed, score, share
 from agents.experiments.training import class_counts, pattern_seeds, training
-from agents.experiments.verdict import Claim, Finding, Results
+from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import GREY, INK, METHOD_COLOURS, RED, WIDE, letter, panels
 
 if TYPE_CHECKING:
@@ -94,6 +94,16 @@ def _judge(results: Results) -> Finding:
         shares[0].below(ASKED),
         {"“ahead” means ahead at the median η": shares[1].below(ASKED)},
         numbers,
+        forest=Forest(
+            "share of runs",
+            0.0,
+            ASKED,
+            (
+                Mark("any η ahead", shares[0], shares[0].below(ASKED)),
+                Mark("median η ahead", shares[1], shares[1].below(ASKED)),
+            ),
+            1 / 5,
+        ),
     )
 
 

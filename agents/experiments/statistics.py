@@ -60,6 +60,11 @@ class Wins(NamedTuple):
         """Wins per pair."""
         return self.wins / self.pairs
 
+    @property
+    def interval(self) -> Interval:
+        """The share with its interval."""
+        return Interval(self.share, self.low, self.high)
+
     def __str__(self) -> str:
         return (
             f"{self.wins} of {self.pairs} ({self.share:.0%} [{self.low:.0%} … {self.high:.0%}], p "
@@ -165,6 +170,32 @@ def stratified_bootstrap(
     again = statistic(*(array[draws, np.arange(tasks)] for array in arrays))
     low, high = np.percentile(again, (2.5, 97.5))
     return Interval(value, float(low), float(high))
+
+
+PER_THOUSAND = "mistakes per 1,000 bins"
+
+
+def mistake_rates(results: xr.Dataset) -> xr.DataArray:
+    """Mistakes in 1,000 bins of each neuron, its evaluation runs taken together.
+
+    Runs that reached the cap made no mistake. Half a mistake is added, so that a neuron that made
+    none has a rate, and the rate a logarithm.
+    """
+    survived = results["survived"]
+    cap = results.attrs["settings"]["common"]["cap"]
+    return rate((survived < cap).sum("run"), survived.sum("run"))
+
+
+def rate(mistakes: Any, bins: Any) -> Any:
+    """Mistakes in 1,000 bins, half a mistake added."""
+    return 1_000.0 * (mistakes + 0.5) / bins.clip(1)
+
+
+def typical_rate(rates: xr.DataArray) -> xr.DataArray:
+    """Geometric mean over the pattern seeds."""
+    logarithms: Any = np.log(rates)
+    found: xr.DataArray = np.exp(logarithms.mean("pattern_seed"))
+    return found
 
 
 def mistakes_per_thousand(survived: ArrayLike, cap: int) -> float:

@@ -26,11 +26,15 @@ Results: TypeAlias = "Mapping[str, xr.Dataset]"
 
 
 class Mark(NamedTuple):
-    """One number of ours beside the paper's: under what, the interval, and whether it agrees."""
+    """One number of ours beside the paper's: under what, the interval, and whether it agrees.
+
+    `at` is the paper's own number where it has one of its own for this row.
+    """
 
     label: str
     value: Interval
     holds: bool
+    at: float | None = None
 
 
 class Forest(NamedTuple):
@@ -143,18 +147,21 @@ class Hypothesis:
 
 class Tried(NamedTuple):
     """What a rule found from one kind of initial weights: whether the claim holds, ours in words,
-    and whether a weaker form of it does."""
+    whether a weaker form of it does, and the number that a forest plot shows."""
 
     holds: bool
     words: str
     weaker: bool = False
+    value: Interval | None = None
 
 
-def from_both_starts(judge: Callable[[str], Tried], weaker: str = "") -> Finding:
+def from_both_starts(
+    judge: Callable[[str], Tried], weaker: str = "", forest: Forest | None = None
+) -> Finding:
     """The finding of a rule that `judge` tries from each kind of initial weights.
 
     The start is a condition, and so is the weaker form (named by `weaker`) where the claim itself
-    does not hold.
+    does not hold. `forest`, without marks, says where the values of what was tried are drawn.
     """
     tried = {start: judge(start) for start in STARTS}
     conditions = {f"the initial weights are the {s} ones": one.holds for s, one in tried.items()}
@@ -163,6 +170,12 @@ def from_both_starts(judge: Callable[[str], Tried], weaker: str = "") -> Finding
             f"{weaker} ({start} initial weights)": one.weaker and not one.holds
             for start, one in tried.items()
         }
+    if forest:
+        marks = (Mark(s, one.value, one.holds) for s, one in tried.items() if one.value)
+        forest = forest._replace(marks=tuple(marks))
     return Finding(
-        all(one.holds for one in tried.values()), conditions, tuple(t.words for t in tried.values())
+        all(one.holds for one in tried.values()),
+        conditions,
+        tuple(one.words for one in tried.values()),
+        forest=forest,
     )

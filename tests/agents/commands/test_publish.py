@@ -60,6 +60,15 @@ def test_claims_and_figures_are_kept(places: list[str], tmp_path: Path) -> None:
     assert "| toy | 18 | 2 s | 3 s | 0123456789 |" in text
 
 
+def test_a_forest_plot_stands_beside_its_claim(places: list[str], tmp_path: Path) -> None:
+    (tmp_path / "report" / "forests").mkdir()
+    (tmp_path / "report" / "forests" / "F3a.svg").write_text("svg")
+    run(places)
+    text = (tmp_path / "docs" / "quick" / "claims.md").read_text()
+    assert "one<br>two<br>![F3a: ours beside the paper's](forests/F3a.svg) |" in text
+    assert (tmp_path / "docs" / "quick" / "forests" / "F3a.svg").exists()
+
+
 def test_an_unpacked_store_is_the_store_that_it_was(places: list[str], tmp_path: Path) -> None:
     (archive,) = run(places, "--stores")["stores"]
     with zipfile.ZipFile(archive) as file:

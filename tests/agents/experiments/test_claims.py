@@ -19,12 +19,14 @@ ELSEWHERE = ("D1", "D2", "D3", "D4", "D5", "D6", "D7", "F6c", "S2")
 
 LISTED = [
     *ELSEWHERE,
-    *("F1c", "F1d", "F2", "F3a", "F3b", "F3c", "F3d", "F3e", "F4"),
+    *("F1b", "F1c", "F1d", "F2", "F3a", "F3b", "F3c", "F3d", "F3e", "F3f", "F4"),
     *("F5a", "F5b", "F6a1", "F6a2", "F6b", "F7a", "F7b", "F7c", "F8"),
     *("F3e+", "F4+", "F6a1+", "F6a2+", "F6b+", "F7a+", "F7b+"),
 ]
 SCORED = [
-    id_ for id_ in LISTED if id_ not in (*ELSEWHERE, "F1c", "F1d", "F2", "F8", "F4+", "F6a2+")
+    id_
+    for id_ in LISTED
+    if id_ not in (*ELSEWHERE, "F1b", "F1c", "F1d", "F2", "F3f", "F8", "F4+", "F6a2+")
 ]
 
 
@@ -67,6 +69,23 @@ def test_a_low_cap_hides_what_a_high_one_shows(id_: str) -> None:
     assert finding.verdict == f"{REPRODUCED} if {', or '.join(high)}"
     assert finding.forest is not None
     assert len(finding.forest.marks) == len(finding.conditions) == 7
+
+
+def test_a_map_below_its_cap_is_judged_for_both_readouts_and_starts() -> None:
+    finding = found("F3f", lambda setting: as_in_the_paper(setting) / 10)
+    assert finding.verdict == REPRODUCED
+    assert len(finding.numbers) == 3
+    assert found("F3f").verdict == NOT_REPRODUCED  # all that is good reaches the cap
+
+
+@pytest.mark.parametrize("id_", ["F3e", "F4", "F5b", "F6a1", "F6a2", "F6b", "F7a", "F7b"])
+def test_a_claim_with_a_number_has_a_forest_plot_that_agrees_with_its_verdict(id_: str) -> None:
+    finding = found(id_)
+    assert finding.forest is not None
+    marks = finding.forest.marks
+    assert marks
+    assert all(mark.holds for mark in marks)
+    assert all(finding.forest.low <= mark.value.value <= finding.forest.high for mark in marks)
 
 
 def flat(setting: Setting) -> float:
@@ -249,6 +268,8 @@ def test_continuous_outputs_are_compared_with_their_targets(
     finding = BY_ID["F2"].finding({"F2": data})
     assert finding is not None
     assert finding.verdict == verdict
+    assert finding.forest is not None
+    assert [mark.at for mark in finding.forest.marks] == [0.81, 0.99]
 
 
 def chemistry(deviation: Any, wrong: Any) -> xr.Dataset:

@@ -6,16 +6,17 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 from agents.experiments.figures import FORMATS, draw
-from agents.experiments.heat_maps import draw_one_class
-from agents.experiments.listing import experiments, pictures
+from agents.experiments.heat_maps import draw_one_class, sides
+from agents.experiments.listing import claims, experiments, pictures
 from agents.experiments.residuals import draw_residuals
 from agents.plotting import MAP, save, styled
 from tests.agents.experiments.worlds import as_in_the_paper, world
 
 PICTURES = pictures()
-SCORED = ("F1", "F3", "F3-wide", "F4", "F5", "LINES", "F6", "F7", "BP", "CONDITIONS", "table")
+SCORED = ("F1", "F3", "F3-wide", "F4", "F5", "LINES", "F6", "F7", "BP", "CONDITIONS", "NEURONS")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,33 @@ def test_every_axis_has_a_label_with_units(results: dict[str, xr.Dataset]) -> No
         figure = draw_one_class(results, "matched")
     labels = {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())}
 
-    assert labels == {"η (model choice)", "α (decay per bin)", "noisy performance (bins)", ""}
+    assert labels == {
+        "η (model choice)",
+        "α (decay per bin)",
+        "noisy performance (bins)",
+        "mistakes per 1,000 bins",
+        "",
+    }
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_the_papers_own_numbers_stand_beside_ours(results: dict[str, xr.Dataset]) -> None:
+    with styled():
+        one = PICTURES["F3"].draw(results)
+        more = PICTURES["F4"].draw(results)
+    assert texts(one).count("paper 377") == 2
+    assert texts(more).count("paper 200") == 1
+    # NEURONS has no four classes at quick size.
+    assert sum(text.startswith("MST ") for text in texts(more)) == 4
+
+
+def test_names_on_a_colour_bar_do_not_hide_each_other() -> None:
+    assert sides([0.6, 0.8]) == ["right", "left"]
+    assert sides([0.05, 0.9]) == ["left", "right"]
+    assert sides([0.5]) == ["center"]
 
 
 def test_a_best_line_at_the_end_of_the_range_is_said_in_the_caption(
@@ -104,10 +131,10 @@ def test_grey_printing_keeps_the_order_of_the_scores() -> None:
     assert np.all(np.diff(lightness) > 0)
 
 
-def test_every_experiment_is_in_a_figure_or_beside_one() -> None:
-    drawn = {need for picture in PICTURES.values() for need in picture.needs}
+def test_every_experiment_is_drawn_or_judged() -> None:
+    used = {need for one in (*PICTURES.values(), *claims()) for need in one.needs}
 
-    assert set(experiments()) <= drawn
+    assert set(experiments()) <= used
 
 
 def test_a_folder_that_cannot_be_made_is_an_error(results: dict[str, xr.Dataset]) -> None:

@@ -48,3 +48,13 @@ def test_a_plot_is_told_in_numbers_too() -> None:
 @pytest.mark.parametrize("forest", [RATIO, RATIO._replace(marks=MARKS[:1])])
 def test_a_small_figure_grows_with_its_rows(forest: Forest) -> None:
     assert small(forest).get_figheight() == pytest.approx(0.55 + 0.16 * len(forest.marks))
+
+
+def test_a_row_may_have_a_number_of_the_papers_own() -> None:
+    own = RATIO._replace(marks=(MARKS[0]._replace(at=0.81), MARKS[1]))
+    assert [row.get("paper") for row in described(own)["ours"]] == [0.81, None]
+    _, grid = panels(1, 1, width=WIDE, height=2.0)
+    draw_forest(grid[0, 0], own)
+    lines = [part for part in grid[0, 0].collections if hasattr(part, "get_segments")]
+    ends = [part.get_segments()[0][:, 0].tolist() for part in lines]
+    assert [0.81, 0.81] in ends

@@ -17,9 +17,11 @@ from agents.experiments.statistics import (
     mean,
     median,
     middle_means,
+    mistake_rates,
     mistakes_per_thousand,
     score,
     stratified_bootstrap,
+    typical_rate,
     wins,
 )
 
@@ -155,3 +157,13 @@ def test_the_mistake_rate_of_capped_runs_is_that_of_the_stream() -> None:
     bins = np.random.default_rng(3).geometric(1 / 500, 20_000) - 1
     assert mistakes_per_thousand(np.minimum(bins, 400), 400) == pytest.approx(2.0, abs=0.12)
     assert mistakes_per_thousand([400, 400], 400) == 0.0
+
+
+def test_a_neuron_without_mistakes_has_a_rate_and_seeds_count_alike() -> None:
+    survived = xr.DataArray(
+        [[1_000, 1_000], [10, 30]], dims=("pattern_seed", "run"), name="survived"
+    )
+    results = xr.Dataset({"survived": survived}, attrs={"settings": {"common": {"cap": 1_000}}})
+    rates = mistake_rates(results)
+    assert rates.to_numpy().tolist() == [0.25, 62.5]
+    assert float(typical_rate(rates)) == pytest.approx((0.25 * 62.5) ** 0.5)
