@@ -32,8 +32,11 @@ from gnm_env import Patterns, Task, Trial
 from gnm_env.batches import draw_batch
 from gnm_env.compiled import is_kept
 
-SHARES = 2
-"""The second process may take so much longer than this one for its part; then it is given up."""
+PATIENCE = 2.0
+"""This process waits at most so many times as long as its own part took."""
+
+_KILLED = 5.0
+"""Seconds in which a process that is killed should be gone."""
 
 _SECOND = """
 import pickle, sys
@@ -56,7 +59,7 @@ def compile_ahead(agent: Any, task: Task, patterns: Patterns) -> None:
     try:
         with event.install_listener("numba:compile", _AtFirst(second.start)):
             _first_part(agent, TaskSource(task, patterns))
-        second.wait(SHARES * (time.monotonic() - began))
+        second.wait(PATIENCE * (time.monotonic() - began))
     finally:
         second.end()
 
@@ -128,7 +131,7 @@ class _Second:
     def end(self) -> None:
         if self._process is not None:
             self._process.kill()
-            self._process.wait()
+            self.wait(_KILLED)
             assert self._process.stdin is not None
             self._process.stdin.close()
 
