@@ -90,6 +90,11 @@ def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:
     return dispatcher
 
 
+def is_kept(dispatcher: Any) -> bool:
+    """Whether what is compiled of a function is kept on disk, as far as can be told beforehand."""
+    return isinstance(dispatcher._cache, _Cache)
+
+
 def specialise(
     template: Callable[..., Any], label: str, *, inline: bool = False, **bindings: Any
 ) -> Any:

@@ -21,7 +21,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from gnm_env.compiled import compiled, inlined
-from gnm_env.task import TaskArrays
+from gnm_env.task import PatternNoise, TaskArrays
 
 PIECE_BINS = 2_048
 """Most noise bins in one piece of the endless stream, so that memory stays bounded as q -> 0."""
@@ -98,47 +98,41 @@ def _pattern_spikes(task: TaskArrays, class_: int) -> int:
     return task.pattern_offsets[(class_ + 1) * bins] - task.pattern_offsets[class_ * bins]
 
 
-@inlined
-def _fill_occurrence(
-    rng: Generator,
-    task: TaskArrays,
-    class_: int,
-    channels: NDArray[np.int32],
-    offsets: NDArray[np.int64],
-    bin_: int,
-) -> None:
-    """Put an occurrence of pattern `class_` at bin `bin_`; there is room."""
-    if task.jitter_bins > 0 or task.deletion > 0.0:
-        _fill_noisy_pattern(rng, task, class_, channels, offsets, bin_)
-    else:
-        _fill_pattern(task, class_, channels, offsets, bin_)
-
-
 @compiled
 def _fill_pattern(
+    rng: Generator,
     task: TaskArrays,
+    noise: PatternNoise | None,
     class_: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
-    """Put an occurrence of pattern `class_` at bin `bin_`, without noise on it; there is room."""
-    bins = task.pattern_bins
-    first = task.pattern_offsets[class_ * bins]
-    last = task.pattern_offsets[(class_ + 1) * bins]
-    n_events = offsets[bin_]
-    for e in range(first, last):
-        channels[np.uint64(n_events + e - first)] = task.pattern_channels[np.uint64(e)]
-    for m in range(1, bins + 1):
-        offsets[np.uint64(bin_ + m)] = (
-            n_events + task.pattern_offsets[np.uint64(class_ * bins + m)] - first
-        )
+    """Put an occurrence of pattern `class_` at bin `bin_`, with `noise` on it; there is room.
+
+    `noise` is that of the task, in a place of its own since numba leaves out what a None in the
+    arguments rules out: a task whose patterns come as they are compiles nothing for noise on them.
+    """
+    if noise is not None:
+        _fill_noisy_pattern(rng, task, noise, class_, channels, offsets, bin_)
+    else:
+        bins = task.pattern_bins
+        first = task.pattern_offsets[class_ * bins]
+        last = task.pattern_offsets[(class_ + 1) * bins]
+        n_events = offsets[bin_]
+        for e in range(first, last):
+            channels[np.uint64(n_events + e - first)] = task.pattern_channels[np.uint64(e)]
+        for m in range(1, bins + 1):
+            offsets[np.uint64(bin_ + m)] = (
+                n_events + task.pattern_offsets[np.uint64(class_ * bins + m)] - first
+            )
 
 
 @compiled
 def _fill_noisy_pattern(
     rng: Generator,
     task: TaskArrays,
+    noise: PatternNoise,
     class_: int,
     channels: NDArray[np.int32],
     offsets: NDArray[np.int64],
@@ -146,7 +140,7 @@ def _fill_noisy_pattern(
 ) -> None:
     """Put an occurrence of pattern `class_` at bin `bin_`, with noise on it; there is room."""
     n_events = offsets[bin_]
-    cells = _noisy_cells(rng, task, class_)
+    cells = _noisy_cells(rng, task, noise, class_)
     for m in range(1, task.pattern_bins + 1):
         offsets[bin_ + m] = 0
     for k in range(cells.size):
@@ -161,7 +155,9 @@ def _fill_noisy_pattern(
 
 
 @compiled
-def _noisy_cells(rng: Generator, task: TaskArrays, class_: int) -> NDArray[np.int64]:
+def _noisy_cells(
+    rng: Generator, task: TaskArrays, noise: PatternNoise, class_: int
+) -> NDArray[np.int64]:
     """Cells m·N + channel of the pattern's spikes after deletion and jitter, ascending."""
     bins = task.pattern_bins
     first = task.pattern_offsets[class_ * bins]
@@ -172,11 +168,11 @@ def _noisy_cells(rng: Generator, task: TaskArrays, class_: int) -> NDArray[np.in
         for e in range(
             task.pattern_offsets[class_ * bins + m], task.pattern_offsets[class_ * bins + m + 1]
         ):
-            if task.deletion > 0.0 and rng.random() < task.deletion:
+            if noise.deletion > 0.0 and rng.random() < noise.deletion:
                 continue
             moved = m
-            if task.jitter_bins > 0:
-                moved += int(rng.random() * (2 * task.jitter_bins + 1)) - task.jitter_bins
+            if noise.jitter_bins > 0:
+                moved += int(rng.random() * (2 * noise.jitter_bins + 1)) - noise.jitter_bins
                 moved = min(max(moved, 0), bins - 1)
             cells[kept] = moved * task.n_inputs + task.pattern_channels[e]
             kept += 1
@@ -294,7 +290,7 @@ def fill_trial(
             if fits:
                 onsets[k] = t - d.first_bin
                 classes[k] = class_
-                _fill_occurrence(rng, task, class_, channels, offsets, t)
+                _fill_pattern(rng, task, task.noise, class_, channels, offsets, t)
                 t += task.pattern_bins
                 n_events = offsets[t]
                 k += 1
@@ -388,7 +384,7 @@ def append_piece(
         noise_left = -1.0
         class_ = int(rng.random() * task.n_classes)
         channels = grown(channels, n_events + _pattern_spikes(task, class_))
-        _fill_occurrence(rng, task, class_, channels, offsets, bin_ + n_noise)
+        _fill_pattern(rng, task, task.noise, class_, channels, offsets, bin_ + n_noise)
     return channels, offsets, n_noise, class_, noise_left
 
 

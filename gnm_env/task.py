@@ -346,6 +346,13 @@ def _scatter(channels: NDArray[Any], offsets: NDArray[Any], raster: NDArray[Any]
             raster[t, channels[e]] = 1
 
 
+class PatternNoise(NamedTuple):
+    """Noise on the occurrences of patterns; see the fields of `Task`."""
+
+    jitter_bins: int
+    deletion: float
+
+
 class TaskArrays(NamedTuple):
     """Task and patterns in the form in which compiled code takes them. Made by `task_arrays`."""
 
@@ -353,8 +360,8 @@ class TaskArrays(NamedTuple):
     pattern_bins: int
     background_bins: int
     n_classes: int
-    jitter_bins: int
-    deletion: float
+    noise: PatternNoise | None
+    """None where patterns come as they are: code that adds it is then not even compiled."""
     mean_occurrences: float
     hazard: float
     """−ln(1−p): a unit exponential over it, rounded down, is the geometric gap between spikes."""
@@ -398,14 +405,14 @@ def _task_arrays(task: Task, patterns: Patterns) -> TaskArrays:
     )
     rates = np.array([] if task.rates is None else task.rates, np.float64)
     most = task.rate if task.rates is None else max(task.rates)
+    noisy = task.jitter_bins > 0 or task.deletion > 0.0
     with np.errstate(divide="ignore"):
         return TaskArrays(
             task.n_inputs,
             task.pattern_bins,
             task.background_bins,
             task.n_classes,
-            task.jitter_bins,
-            task.deletion,
+            PatternNoise(task.jitter_bins, task.deletion) if noisy else None,
             task.mean_occurrences,
             float(-np.log1p(-most)),
             float(-np.log1p(-task.onset_probability)),

@@ -22,6 +22,7 @@ import numpy as np
 
 from agents import History, load_checkpoint, plot, train, train_many
 from agents.commands import fields
+from agents.commands.ahead import compile_ahead
 from agents.commands.output import Output
 from agents.commands.scoring import report, score
 from agents.commands.terminal import Parser, Stopped, at_least, share
@@ -223,6 +224,7 @@ def learn(what: tuple[Any, Task, Patterns, Any], options: argparse.Namespace, sa
                 env = _environment(agent, task, patterns)
                 train(agent, env, options.trials, rng, callback=told, block=block)
             else:
+                compile_ahead(agent, task, patterns)
                 train_many(
                     [agent], task, patterns, options.trials, rng, 1, callback=told, block=block
                 )

@@ -41,20 +41,23 @@ def weight_change(
         for i in range(len(eligibility)):
             store(eligibility, i, step)
         return
-    bar = nth_largest(eligibility, count, sign != 0.0, step)
+    bar = nth_largest(eligibility, static, sign != 0.0, step)
     for i in range(len(eligibility)):
         store(eligibility, i, where(load(eligibility, i, step) > bar, step, like(0.0, step)))
 
 
 @compiled
-def nth_largest(values: NDArray[np.float64], n: int, learns: Any, lanes: Any) -> Any:
+def nth_largest(
+    values: NDArray[np.float64], static: tuple[int, ...], learns: Any, lanes: Any
+) -> Any:
     """A number as good as the (n+1)-th largest value: the same values lie strictly above both.
 
-    In the lanes that `learns` names; `lanes` says how many there are.
+    In the lanes that `learns` names; `lanes` says how many there are. `static` is that of the rule,
+    n first: by its length alone one way is chosen, and the other is not compiled.
     """
-    if n > _INSERTED:
-        return _between(values, n, learns, lanes)
-    return load(_largest(values, n, lanes), n, lanes)
+    if len(static) > 1:
+        return _between(values, static[0], learns, lanes)
+    return load(_largest(values, static[0], lanes), static[0], lanes)
 
 
 @compiled
@@ -221,4 +224,4 @@ class AggregateLabel(Rule):
                 f"fraction {self.fraction:g} of {n_inputs} inputs is no input at all, and nothing "
                 f"would be learned: choose fraction >= {0.51 / n_inputs:.3g}"
             )
-        return (count,)
+        return (count, n_inputs) if count > _INSERTED else (count,)

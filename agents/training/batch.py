@@ -15,6 +15,7 @@ from agents.training.compile_errors import COMPILING, explained
 from agents.training.exploration import put_state, state_of
 from agents.training.source import Source
 from agents.training.streams import MOST_SPIKES, Learning, Models, Tally
+from gnm_env.batches import Batch, new_batch
 
 if TYPE_CHECKING:
     from agents.training.agent import Agent
@@ -125,15 +126,31 @@ class AgentBatch:
         """
         wrong, absolute = self._zeros(), self._zeros()
         for done, batch, drawn, longest in self._source.batches(rng, ahead, trials):
-            try:
-                self._loops.train(
-                    batch, drawn, longest, self._models, self._learning, self._trials + done,
-                    wrong, absolute,
-                )  # fmt: skip
-            except COMPILING as error:
-                raise explained(error, self._agents[0].model, self._agents[0].rule) from None
+            self._learn(batch, drawn, longest, self._trials + done, wrong, absolute)
         self._trials += trials
         return self._per_agent(wrong).astype(np.int64), self._per_agent(absolute)
+
+    def _learn(
+        self,
+        batch: Batch,
+        drawn: int,
+        longest: int,
+        first: int,
+        wrong: NDArray[np.float64],
+        absolute: NDArray[np.float64],
+    ) -> None:
+        """Learn each trial of a batch, whose first is number `first`."""
+        try:
+            self._loops.train(
+                batch, drawn, longest, self._models, self._learning, first, wrong, absolute
+            )
+        except COMPILING as error:
+            raise explained(error, self._agents[0].model, self._agents[0].rule) from None
+
+    def hear_nothing(self) -> None:
+        """Learn from, and answer, a batch without a trial: compiles what does."""
+        self._learn(new_batch(), 0, 0, self._trials, self._zeros(), self._zeros())
+        self._loops.answer(new_batch(), 0, 0, self._models, self._tally())
 
     def _zeros(self) -> NDArray[np.float64]:
         """A number for each lane, (blocks, 1, width)."""
@@ -149,21 +166,24 @@ class AgentBatch:
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         """Responses to `trials` trials of the source, learning off."""
-        n_blocks, n_classes = len(self._models.weights), self._source.n_classes
-        table = np.zeros((n_blocks, self._width, n_classes, MOST_SPIKES + 1), np.int64)
-        tally = Tally(table, self._zeros(), self._zeros(), self._zeros())
+        tally = self._tally()
         noise_bins = 0
         ahead = self._source.ahead(rng, trials)
         for _, batch, drawn, longest in self._source.batches(rng, ahead, trials):
             noise_bins += self._loops.answer(batch, drawn, longest, self._models, tally)
         return Answers(
-            table.reshape(n_blocks * self._width, n_classes, MOST_SPIKES + 1)[: len(self._agents)],
+            tally.table.reshape(-1, *tally.table.shape[2:])[: len(self._agents)],
             self._per_agent(tally.false_positives).astype(np.int64),
             noise_bins,
             self._per_agent(tally.wrong).astype(np.int64),
             self._per_agent(tally.absolute),
             trials,
         )
+
+    def _tally(self) -> Tally:
+        n_blocks, n_classes = len(self._models.weights), self._source.n_classes
+        table = np.zeros((n_blocks, self._width, n_classes, MOST_SPIKES + 1), np.int64)
+        return Tally(table, self._zeros(), self._zeros(), self._zeros())
 
     def write_back(self) -> None:
         """Put what was learned into the agents."""

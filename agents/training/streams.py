@@ -184,13 +184,15 @@ def survive_template(rng: Generator, task: TaskArrays, cap: int, models: Models)
     channels, offsets = np.empty(256, np.int32), np.zeros(512, np.int64)
     noise_left = -1.0
     heard_bins = 0
-    while heard_bins < cap and alive.any():
+    any_alive = True
+    while heard_bins < cap and any_alive:
         channels, offsets, n_noise, class_, noise_left = append_piece(
             rng, task, noise_left, channels, offsets, 0
         )
         n_bins = min(n_noise + (task.pattern_bins if class_ >= 0 else 0), cap - heard_bins)
         owed = float(task.targets[class_]) if class_ >= 0 else 0.0
         last_bin = n_noise + task.pattern_bins - 1
+        any_alive = False
         for block in range(n_blocks):
             living = load(alive[block], 0, zero)
             if not any_lane(living > 0.0):
@@ -211,6 +213,7 @@ def survive_template(rng: Generator, task: TaskArrays, cap: int, models: Models)
                     living = where(too_few(given, owed), zero, living)
                 survived = survived + living
             pack(states[block], state)
+            any_alive |= any_lane(living > 0.0)
             store(alive[block], 0, living)
             store(bins[block], 0, survived)
             # The next piece goes on in the same noise, unless a pattern has ended this one.

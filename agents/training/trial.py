@@ -213,7 +213,7 @@ def new_scratch(n_weights: int, width: int) -> Scratch:
     return Scratch(
         np.zeros((n_weights, width)),
         np.zeros((1, width)),
-        np.ones((1, width)),
+        np.full((1, width), 1.0),
         np.zeros((1, width)),
     )
 

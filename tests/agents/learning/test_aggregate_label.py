@@ -132,13 +132,14 @@ def bars(values: NDArray[np.float64], places: list[int]) -> NDArray[np.float64]:
     width = values.shape[1]
 
     @njit(error_model="numpy")
-    def bar(values: NDArray[np.float64], n: int, out: NDArray[np.float64]) -> None:
+    def bar(values: NDArray[np.float64], static: Any, out: NDArray[np.float64]) -> None:
         zero = full(0.0, width)
-        store(out, 0, nth_largest(values, n, zero == zero, zero))
+        store(out, 0, nth_largest(values, static, zero == zero, zero))
 
     found = np.empty((len(places), width))
     for row, n in enumerate(places):
-        bar(values, n, found[row : row + 1])
+        static = AggregateLabel(fraction=n / len(values)).static(len(values)) if n else (0,)
+        bar(values, static, found[row : row + 1])
     return found
 
 
