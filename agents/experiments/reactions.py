@@ -193,12 +193,12 @@ CLAIMS = (
         "approach the deterministic solution; fewer molecules, more wrong outputs",
         "continuous GNM, η 0, α 0.2, ALL, 60,000 trials, trained with the response that it has as "
         "a reaction network (C = 10); exact stochastic simulation",
-        "of the pattern seeds whose network is right with infinitely many molecules: reproduced if "
-        "the rms deviation of V from the deterministic V shrinks from 25 to 100 and from 100 to "
-        "500 molecules (ratios with intervals above 1, bootstrap over runs; they are √4 and √5 by "
-        "theory, so this checks the engine) and wrong outputs per trial do not rise with the "
-        "number of molecules, with an interval of the fall from 25 to 500 above 0 (bootstrap over "
-        "trials)",
+        "reproduced if, of the pattern seeds whose network is right with infinitely many "
+        "molecules, the rms deviation of V from the deterministic V shrinks from 25 to 100 and "
+        "from 100 to 500 molecules (ratios with intervals above 1, bootstrap over runs; they are "
+        "√4 and √5 by theory, so this checks the engine) and wrong outputs per trial do not rise "
+        "with the number of molecules, with an interval of the fall from 25 to 500 above 0 "
+        "(bootstrap over trials)",
         ("F8",),
         "gnm/PatternTrial-v0, graded, 2 classes",
         _judge,

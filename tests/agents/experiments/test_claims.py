@@ -272,7 +272,8 @@ def test_continuous_outputs_are_compared_with_their_targets(
     assert [mark.at for mark in finding.forest.marks] == [0.81, 0.99]
 
 
-def chemistry(deviation: Any, wrong: Any) -> xr.Dataset:
+def chemistry(deviation: Any, wrong: Any, alone: tuple[float, float] = (0.9, 2.1)) -> xr.Dataset:
+    """Made-up results of one pattern seed; `alone` is S of each pattern, with 1 and 2 owed."""
     spread = 1 + 0.05 * np.cos(np.arange(12))
     return xr.Dataset(
         {
@@ -284,6 +285,8 @@ def chemistry(deviation: Any, wrong: Any) -> xr.Dataset:
                 ("classes", "pattern_seed", "molecules", "heard"),
                 np.array([[w + k % 2 for k in range(12)] for w in wrong])[None, None],
             ),
+            "wrong_deterministic": (("classes", "pattern_seed", "heard"), np.zeros((1, 1, 12))),
+            "S_alone": (("classes", "pattern_seed", "class"), np.array(alone)[None, None]),
         },
         {"molecules": list(MOLECULES), "traced": list(TRACED)},
     )
@@ -305,6 +308,15 @@ def test_more_molecules_have_to_come_closer_and_err_less(
     finding = BY_ID["F8"].finding({"F8": chemistry(deviation, wrong)})
     assert finding is not None
     assert finding.verdict == verdict
+
+
+def test_molecules_are_not_blamed_for_what_a_network_gets_wrong_by_itself() -> None:
+    wrong = [4 if m <= TRACED[0] else 1 for m in MOLECULES]
+    results = chemistry((0.2, 0.1, 0.045), wrong, alone=(0.9, 1.4))
+    finding = BY_ID["F8"].finding({"F8": results})
+    assert finding is not None
+    assert finding.verdict == NOT_REPRODUCED
+    assert finding.numbers[0].startswith("of 1 trained neurons 0 give both patterns")
 
 
 def test_verdicts_are_the_four_that_the_report_knows() -> None:
