@@ -166,13 +166,15 @@ class AgentBatch:
 
     def answer(self, rng: Generator, trials: int) -> Answers:
         """Responses to `trials` trials of the source, learning off."""
-        tally = self._tally()
+        tally, n_blocks = self._tally(), len(self._models.weights)
         noise_bins = 0
         ahead = self._source.ahead(rng, trials)
         for _, batch, drawn, longest in self._source.batches(rng, ahead, trials):
             noise_bins += self._loops.answer(batch, drawn, longest, self._models, tally)
         return Answers(
-            tally.table.reshape(-1, *tally.table.shape[2:])[: len(self._agents)],
+            tally.table.reshape(n_blocks * self._width, *tally.table.shape[2:])[
+                : len(self._agents)
+            ],
             self._per_agent(tally.false_positives).astype(np.int64),
             noise_bins,
             self._per_agent(tally.wrong).astype(np.int64),
