@@ -34,18 +34,14 @@ def filled(wanted: Experiment, values: dict[str, Any]) -> xr.Dataset:
     """A finished store of the experiment; `values` gives each cell's value from its setting."""
     dims = [axis.name for axis in wanted.axes]
     coords = {axis.name: list(axis.values) for axis in wanted.axes}
-    cells = [
-        setting | dict(zip(dims, cell, strict=True))
-        for cell, setting in zip(
-            np.ndindex(wanted.shape), wanted._cells(tuple((0, n) for n in wanted.shape)),
-            strict=True,
-        )
-    ]  # fmt: skip
     arrays = {}
     for variable in wanted.variables:
         lengths = tuple(wanted.lengths[dim] for dim in variable.dims)
-        table = np.array([np.broadcast_to(values[variable.name](c), lengths) for c in cells])
-        arrays[variable.name] = ((*dims, *variable.dims), table.reshape(*wanted.shape, *lengths))
+        table = np.empty((*wanted.shape, *lengths))
+        for block in wanted.blocks():
+            cells = [np.broadcast_to(values[variable.name](s), lengths) for s in block.settings]
+            table[block.region] = np.reshape(cells, (*block.shape, *lengths))
+        arrays[variable.name] = ((*dims, *variable.dims), table)
     return xr.Dataset(arrays, coords, {"settings": wanted.settings()})
 
 
@@ -94,6 +90,7 @@ def test_the_capacity_is_where_mistakes_reach_the_line() -> None:
     assert crossing(rates * 10.0, loads) == 1.0
 
 
+@pytest.fixture(scope="module")
 def results() -> dict[str, xr.Dataset]:
     """Neurons that hold one pattern for five inputs at any N, and tempotrons right up to 3."""
 
@@ -106,11 +103,6 @@ def results() -> dict[str, xr.Dataset]:
             experiment("LOAD", "quick"), {"right": lambda s: 1.0 - 0.02 * max(s["load"] - 2.5, 0)}
         ),
     }
-
-
-@pytest.fixture(scope="module", name="results")
-def shared_results() -> dict[str, xr.Dataset]:
-    return results()
 
 
 def test_capacity_in_proportion_to_the_inputs_has_an_exponent_of_one(
