@@ -468,10 +468,11 @@ def _draw(results: Results) -> Figure:
     figure, grid = panels(2, 3, width=WIDE, height=4.6)
     _draw_mistakes(grid[0, 0], data)
     places = (grid[0, 1], grid[1, 0], grid[1, 1])
-    for axes, name, (family, situations) in zip(places, "bde", FAMILIES.items(), strict=True):
+    titles = ("b   capacity by inputs", "d   … by length", "e   … by rate")
+    for axes, name, (family, situations) in zip(places, titles, FAMILIES.items(), strict=True):
         _draw_capacity(axes, data, situations)
         axes.set_xlabel(family)
-        letter(axes, f"{name}   capacity")
+        letter(axes, name)
     _draw_growth(grid[0, 2], data)
     _draw_anchor(grid[1, 2], results["LOAD"])
     figure.legend(
@@ -557,7 +558,7 @@ def _draw_anchor(axes: Axes, data: xr.Dataset) -> None:
     axes.axhline(100 * RIGHT, color=GREY, lw=0.8, ls=":")
     axes.set(xlabel="latency patterns per input", ylabel="right answers (%)")
     axes.legend(fontsize=6, loc="lower left")
-    letter(axes, "f   two kinds of latency patterns")
+    letter(axes, "f   latency patterns")
 
 
 EXPERIMENTS = {"CAPACITY": capacity, "LOAD": load}
