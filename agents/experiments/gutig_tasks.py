@@ -319,6 +319,7 @@ def _draw_right(axes: Axes, data: xr.Dataset, task: str) -> None:
         axes.hlines(place, found.low, found.high, color=colour, lw=1.4)
         filled = colour if learner.startswith("GNM") else "white"
         axes.plot(found.value, place, "o", color=colour, mfc=filled, ms=4)
+    axes.axvline(100.0 * task_of(task).owed.count(0) / FEATURES, color="0.5", lw=0.8, ls=":")
     axes.set_xlim(-4, 104)
     axes.set_xticks([0, 50, 100])
     axes.grid(axis="x", lw=0.3)
@@ -335,7 +336,8 @@ PICTURES = {
         "with 95 % bootstrap bands over pattern seeds; errors below 0.001 lie on the floor, a "
         "silent neuron has 1, below the dotted line a task counts as solved. GNM solid, MST "
         "dashed. Below, after training: share of the presentations given just the spikes that "
-        "they are owed, one point per pattern seed, means with intervals, GNM filled, MST open. "
+        "they are owed, one point per pattern seed, means with intervals, GNM filled, MST open; dotted, "
+        "a silent neuron. "
         "PeakError is told where its mistakes were; the others one number a trial, or its sign.",
     )
 }
