@@ -1,7 +1,7 @@
 """TASKS: Gütig's five tasks, in which a neuron finds clues among distractors from one number.
 
 Ten features of 50 bins hide in noise on 500 inputs of 5 Hz, each twice a trial on average. Some are
-clues that are owed output spikes, the others are distractors and owed none; in three kinds of rule
+clues that are owed output spikes, the others are distractors and owed none. By most rules
 the neuron hears no more than whether it gave too many spikes or too few, or by how many (Gütig,
 Science 2016). The setting, 500 bins of background around 20 presentations, is that of a public
 implementation in Python (mackelab/multispike_tempotron, report, §2), whose gradient rule had not
@@ -336,8 +336,8 @@ PICTURES = {
         "with 95 % bootstrap bands over pattern seeds; errors below 0.001 lie on the floor, a "
         "silent neuron has 1, below the dotted line a task counts as solved. GNM solid, MST "
         "dashed. Below, after training: share of the presentations given just the spikes that "
-        "they are owed, one point per pattern seed, means with intervals, GNM filled, MST open; dotted, "
-        "a silent neuron. "
-        "PeakError is told where its mistakes were; the others one number a trial, or its sign.",
+        "they are owed, one point per pattern seed, means with intervals, GNM filled, MST open; "
+        "dotted, a silent neuron. PeakError is told where its mistakes were; the others one number "
+        "a trial, or its sign.",
     )
 }
