@@ -1,7 +1,7 @@
 """Ask what the paper's method could not: run the experiments, draw them, judge the hypotheses.
 
     gnm findings                 minutes: few seeds
-    gnm findings --size paper    about half an hour on one core
+    gnm findings --size paper    about an hour on one core
 
 Each hypothesis and its rule were written down before the run. May be stopped at any moment: what is
 finished is kept, and the next start goes on from there.

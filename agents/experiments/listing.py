@@ -42,7 +42,15 @@ SUBJECTS = (
 )
 """In the order of the paper, which is that of the report."""
 
-BEYOND = ("memory", "who_wins", "ceiling", "hidden_unit", "when_memory")
+BEYOND = (
+    "memory",
+    "who_wins",
+    "ceiling",
+    "hidden_unit",
+    "when_memory",
+    "capacity",
+    "gutig_tasks",
+)
 """In the order of the page on the findings."""
 
 SIZES = ("quick", "paper")
