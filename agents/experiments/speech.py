@@ -327,7 +327,7 @@ def neuron_row(
 
 
 PPO = "PPO, told the label"
-PPO_SETTINGS = {"ent_coef": 0.0, "learning_rate": 1e-3, "gae_lambda": 0.98}
+PPO_SETTINGS: dict[str, Any] = {"ent_coef": 0.0, "learning_rate": 1e-3, "gae_lambda": 0.98}
 """Beside those of `agents.rl`: the best of five on training voices that were held out."""
 PPO_BINS = 8_000_000
 """Bins that PPO hears: some three times each training phrase."""
