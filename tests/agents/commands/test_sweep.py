@@ -168,7 +168,7 @@ def test_seeds_beyond_the_last_are_refused_before_they_are_listed(text: str) -> 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["F99"], "there is no experiment 'F99': choose one of F1, F2"),
+        (["F99"], "there is no experiment 'F99': choose one of F1, F1b"),
         (["F1", "--store", "/proc/nowhere/F1"], "cannot write in /proc/nowhere (No such file"),
         (["F1", "--threads", "0"], "--threads: must be >= 1, got 0"),
         (["F1", "--seeds", "3"], "F1 has no pattern seeds: leave --seeds out"),
