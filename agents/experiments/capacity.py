@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import answers, noisy_performance, train_many
+from agents import GNM, MST, answers, noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap
+from agents.experiments.statistics import Interval, bootstrap, rate
 from agents.experiments.training import learners, make_agent, pattern_seeds, protocol
 from agents.experiments.verdict import Finding, Hypothesis, Results
 from agents.plotting import BLUE, GREY, INK, RED, WIDE, letter, panels
@@ -92,6 +92,11 @@ def task_of(setting: Mapping[str, Any]) -> Task:
     )
 
 
+def usual_task(situation: str) -> Task:
+    """The task of a situation, for what does not depend on the load."""
+    return task_of({**SITUATIONS[situation], "load": 1.0})
+
+
 def scaled(setting: Setting, task: Task) -> Setting:
     """A learner's settings with learning rate and initial weights in proportion to 1/(N p).
 
@@ -105,7 +110,7 @@ def scaled(setting: Setting, task: Task) -> Setting:
     }
 
 
-INITIAL = {"gnm": 0.1, "mst": 0.02}
+INITIAL = {kind.name: kind.default_initial_weight for kind in (GNM, MST)}
 
 
 def capacity(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
@@ -255,10 +260,9 @@ def mistakes(data: xr.Dataset, situation: str, learner: str) -> NDArray[np.float
     cell = data["survived"].sel(situation=situation, learner=learner)
     survived = cell.transpose("pattern_seed", "load", "run").to_numpy()
     made = (survived < data.attrs["settings"]["common"]["cap"]).sum(-1)
-    task = task_of({**SITUATIONS[situation], "load": 1.0})
-    each = task.silent_score + 1.0
+    each = usual_task(situation).silent_score + 1.0
     # The bin of a mistake is heard as well.
-    return np.asarray((made + 0.5) * each / (survived.sum(-1) + made))
+    return np.asarray(rate(made, survived.sum(-1) + made) * each / 1_000.0)
 
 
 class Held(NamedTuple):
@@ -298,7 +302,7 @@ def growth(data: xr.Dataset, learner: str) -> Interval:
     """
     loads = data["load"].to_numpy()
     names = [one for one in FAMILIES["inputs N"] if one in data["situation"].to_numpy()]
-    inputs = np.log([task_of({**SITUATIONS[name], "load": 1.0}).n_inputs for name in names])
+    inputs = np.log([usual_task(name).n_inputs for name in names])
     rates = np.stack([mistakes(data, name, learner) for name in names], axis=1)
 
     def slope(sample: NDArray[np.float64]) -> float:
@@ -346,7 +350,7 @@ def _told(data: xr.Dataset, learner: str) -> str:
     parts = []
     for name in FAMILIES["inputs N"]:
         if name in data["situation"].to_numpy():
-            inputs = task_of({**SITUATIONS[name], "load": 1.0}).n_inputs
+            inputs = usual_task(name).n_inputs
             found, beyond = held(data, name, learner)
             patterns = Interval(*(inputs * end for end in found))
             parts.append(f"{name} {patterns:.1f}" + (" (an end of the loads)" if beyond else ""))
@@ -505,8 +509,8 @@ def _draw_mistakes(axes: Axes, data: xr.Dataset) -> None:
 def _draw_capacity(axes: Axes, data: xr.Dataset, situations: tuple[str, ...]) -> None:
     """Capacity in patterns per input against what is varied."""
     here = [name for name in situations if name in data["situation"].to_numpy()]
-    kind = situations[0].split()[0]
-    at = [_number(name, kind) for name in here]
+    field = next(iter(SITUATIONS[situations[0]]))
+    at = [float(getattr(usual_task(name), field)) for name in here]
     for learner, look in _LOOKS.items():
         _line(axes, at, [held(data, name, learner).value for name in here], look, learner)
     axes.set(xscale="log", yscale="log", ylim=(0.016, 0.4))
@@ -521,7 +525,7 @@ def _draw_capacity(axes: Axes, data: xr.Dataset, situations: tuple[str, ...]) ->
 def _draw_growth(axes: Axes, data: xr.Dataset) -> None:
     """Capacity in patterns against inputs, with the line of proportion."""
     here = [name for name in FAMILIES["inputs N"] if name in data["situation"].to_numpy()]
-    at = np.array([_number(name, "N") for name in here])
+    at = np.array([float(usual_task(name).n_inputs) for name in here])
     for learner, look in _LOOKS.items():
         found = [
             Interval(*(inputs * end for end in held(data, name, learner).value))
@@ -532,13 +536,6 @@ def _draw_growth(axes: Axes, data: xr.Dataset) -> None:
     axes.set(xscale="log", yscale="log", xlabel="inputs N", ylabel="patterns")
     _plain(axes, [float(one) for one in at])
     letter(axes, "c   patterns held")
-
-
-def _number(situation: str, kind: str) -> float:
-    """The number that a situation sets, or the base's own."""
-    own = {"N": 100.0, "M": 50.0, "p": 0.005}
-    name, value = situation.split()
-    return float(value) if name == kind else own[kind]
 
 
 def _plain(axes: Axes, at: list[float]) -> None:

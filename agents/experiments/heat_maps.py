@@ -24,7 +24,7 @@ from agents.experiments.statistics import (
     score,
     typical_rate,
 )
-from agents.experiments.training import class_counts, pattern_seeds, training
+from agents.experiments.training import RUN, class_counts, pattern_seeds, training
 from agents.experiments.verdict import (
     Claim,
     Finding,
@@ -170,6 +170,10 @@ SILENT = Task().silent_score
 FAILURE = 2 * SILENT
 """A region fails if its mean is below twice the score of a neuron that never spikes."""
 
+CAP = RUN["cap"]
+CAP_OF_A = 1_000
+"""The cap of the paper's figure 3a."""
+
 MST_PAPER = 377.0
 BEST_PAPER = 200.0
 """Bins: the paper's MST on one class, and its best cell at four."""
@@ -260,7 +264,7 @@ def _judge_mst(results: Results) -> Finding:
     table = results["table"].sel(classes=1)
     held, words, marks = {}, [], []
     for start, row in MST_ROWS.items():
-        for cap in (10_000, 1_000):
+        for cap in (CAP, CAP_OF_A):
             value = mean(by_seed(score(table.sel(learner=row), cap)))
             held[start, cap] = MST_PAPER / 2 <= value.value <= MST_PAPER * 2
             words.append(f"{start}, cap {cap:,}: {value:,.0f} bins")
@@ -269,7 +273,7 @@ def _judge_mst(results: Results) -> Finding:
         f"the initial weights are the {start} ones and the cap is {cap:,}": holds
         for (start, cap), holds in held.items()
     }
-    holds = held["matched", 10_000] and held["wide", 10_000]
+    holds = held["matched", CAP] and held["wide", CAP]
     forest = Forest("bins", MST_PAPER / 2, MST_PAPER * 2, tuple(marks), MST_PAPER, logarithmic=True)
     return Finding(holds, conditions, tuple(words), forest=forest)
 
@@ -291,10 +295,6 @@ def _judge_classes(results: Results) -> Finding:
         (f"{number} bins for 1, 2, 3, 4 classes", f"at four: {interval:,.0f}"),
         forest=Forest("bins at four classes", 100, 400, marks, BEST_PAPER, logarithmic=True),
     )
-
-
-CAP_OF_A = 1_000
-"""The cap of the paper's figure 3a."""
 
 
 def _judge_low_cap(results: Results) -> Finding:
@@ -519,7 +519,6 @@ class Level(NamedTuple):
     colour: str
 
 
-CAP = 10_000
 PAPER_LEVELS = {"MST": Level("paper", MST_PAPER, INK), "best": Level("paper", BEST_PAPER, INK)}
 
 _ALPHA_LABEL = "α (decay per bin)"

@@ -78,49 +78,27 @@ NEURON_LEARNERS: dict[str, Setting] = {
     "oracle": {"reference": "oracle"},
 }
 
+
+def _rl(algorithm: str, feedback: str, *bins: int, **more: Any) -> Setting:
+    """`bins` is what it hears, for one class, two, …; with more classes it is not trained.
+
+    No more than takes some minutes.
+    """
+    return {"algorithm": algorithm, "feedback": feedback, "bins": bins, **more}
+
+
 RL_LEARNERS: dict[str, Setting] = {
-    "PPO, cost": {"algorithm": "ppo", "feedback": "cost", "bins": (1_600_000, 4_000_000)},
-    "PPO, dense": {
-        "algorithm": "ppo",
-        "feedback": "dense",
-        "bins": (1_600_000, 4_000_000, 4_000_000, 4_000_000),
-    },
-    "PPO linear, cost": {
-        "algorithm": "ppo-linear",
-        "feedback": "cost",
-        "bins": (1_600_000, 4_000_000),
-    },
-    "A2C, dense": {"algorithm": "a2c", "feedback": "dense", "bins": (1_600_000, 4_000_000)},
-    "RecurrentPPO, dense": {
-        "algorithm": "recurrent-ppo",
-        "feedback": "dense",
-        "bins": (800_000, 1_600_000),
-    },
-    "leaky PPO, dense": {
-        "algorithm": "leaky-ppo",
-        "feedback": "dense",
-        "bins": (800_000, 1_600_000),
-    },
-    "GNM by PPO, dense": {
-        "algorithm": "gnm-ppo",
-        "feedback": "dense",
-        "bins": (1_600_000, 1_600_000),
-    },
-    "spiking PPO, dense": {
-        "algorithm": "spiking-ppo",
-        "feedback": "dense",
-        "bins": (1_600_000, 1_600_000),
-    },
-    "DQN, dense": {"algorithm": "dqn", "feedback": "dense", "bins": (400_000, 400_000)},
-    "PPO, random weights": {
-        "algorithm": "ppo",
-        "feedback": "cost",
-        "bins": (0, 0),
-        "spike_probability": 0.5,
-    },
+    "PPO, cost": _rl("ppo", "cost", 1_600_000, 4_000_000),
+    "PPO, dense": _rl("ppo", "dense", 1_600_000, 4_000_000, 4_000_000, 4_000_000),
+    "PPO linear, cost": _rl("ppo-linear", "cost", 1_600_000, 4_000_000),
+    "A2C, dense": _rl("a2c", "dense", 1_600_000, 4_000_000),
+    "RecurrentPPO, dense": _rl("recurrent-ppo", "dense", 800_000, 1_600_000),
+    "leaky PPO, dense": _rl("leaky-ppo", "dense", 800_000, 1_600_000),
+    "GNM by PPO, dense": _rl("gnm-ppo", "dense", 1_600_000, 1_600_000),
+    "spiking PPO, dense": _rl("spiking-ppo", "dense", 1_600_000, 1_600_000),
+    "DQN, dense": _rl("dqn", "dense", 400_000, 400_000),
+    "PPO, random weights": _rl("ppo", "cost", 0, 0, spike_probability=0.5),
 }
-"""`bins`: what it hears, for one class, two, …; with more classes than that it is not trained. No
-more than takes some minutes."""
 
 VARIABLES = (
     Variable(
@@ -250,6 +228,16 @@ def _learner(setting: Setting) -> Callable[[Setting, ScoreSheet], int]:
     return _rl_agent if "algorithm" in setting else _neuron
 
 
+def _too_hard(setting: Setting) -> bool:
+    """Whether a learner is not trained on so many classes; its scores are then missing."""
+    return setting["classes"] > len(setting.get("bins", MATCHED))
+
+
+def _bins_to_hear(setting: Setting) -> int:
+    bins: int = setting["bins"][setting["classes"] - 1]
+    return min(bins, setting.get("most", bins))
+
+
 def _neuron(setting: Setting, sheet: ScoreSheet) -> int:
     """A neuron or the network. Bins heard are trials times their mean length."""
     task, patterns = sheet.task, sheet.patterns
@@ -318,16 +306,6 @@ class RandomSpikes:
         """Independent coins."""
         spikes = self._rng.random(len(observation)) < self._probability
         return spikes.astype(np.int64), None
-
-
-def _too_hard(setting: Setting) -> bool:
-    """Whether a learner is not trained on so many classes; its scores are then missing."""
-    return setting["classes"] > len(setting.get("bins", MATCHED))
-
-
-def _bins_to_hear(setting: Setting) -> int:
-    bins: int = setting["bins"][setting["classes"] - 1]
-    return min(bins, setting.get("most", bins))
 
 
 def _reference(setting: Setting, sheet: ScoreSheet) -> int:
