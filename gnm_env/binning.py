@@ -32,9 +32,8 @@ def times_in_bins(times: Any, bin_width: float, n_bins: int, where: str) -> NDAr
     wrong = ~((spikes >= 0.0) & (spikes < n_bins * bin_width))
     if wrong.any():
         raise ValueError(
-            f"spike times must be >= 0 and < {n_bins * bin_width:g} "
-            f"(n_bins = {n_bins} bins of {bin_width:g}), "
-            f"{where} has {spikes[wrong][0]:g}"
+            f"spike times must be >= 0 and < {n_bins * bin_width:g} (n_bins = {n_bins} bins of "
+            f"{bin_width:g}), {where} has {spikes[wrong][0]:g}"
         )
     bins = spikes / bin_width
     # Whole numbers are what they are where a bin is the unit.

@@ -93,9 +93,9 @@ class Task:
         mean_bins = self.background_bins + self.mean_pattern_bins
         if mean_bins > MAX_MEAN_BINS:
             raise ValueError(
-                f"a trial must have at most {MAX_MEAN_BINS:,} bins on average, "
-                f"got {mean_bins:,.0f}; "
-                "lower background_bins, pattern_bins, n_classes or mean_occurrences"
+                f"a trial must have at most {MAX_MEAN_BINS:,} bins on average, got "
+                f"{mean_bins:,.0f}; lower background_bins, pattern_bins, n_classes or "
+                "mean_occurrences"
             )
 
     def _checked_targets(self) -> tuple[int, ...]:

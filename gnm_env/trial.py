@@ -417,9 +417,8 @@ def _check_presentations(
     if overlaps.any():
         k = int(np.argmax(overlaps))
         raise ValueError(
-            "presentations must come in order and must not overlap, "
-            f"number {k} covers bins {onsets[k]} … {ends[k] - 1}, "
-            f"number {k + 1} bins {onsets[k + 1]} … {ends[k + 1] - 1}"
+            f"presentations must come in order and must not overlap, number {k} covers bins "
+            f"{onsets[k]} … {ends[k] - 1}, number {k + 1} bins {onsets[k + 1]} … {ends[k + 1] - 1}"
         )
     if targets.sum() > MAX_LABEL:
         raise ValueError(f"targets must add up to at most {MAX_LABEL:,}, got {targets.sum():,}")

@@ -276,10 +276,9 @@ def _judge_neuron(results: Results) -> Finding:
 
 _PROTOCOL = (
     "GNM and LIF (α 0.15, no refractory period), MST (τ 20 and 5); weights in [0, 1] or ±0.4; ALL "
-    "λ "
-    "1e-4 and PeakError as tuned on other seeds, 60,000 trials; diagonal CMA-ES with 32 "
-    "candidates, "
-    "30 fresh streams a generation, from the weights of either rule; two and four classes"
+    "λ 1e-4 and PeakError as tuned on other seeds, 60,000 trials; diagonal CMA-ES with 32 "
+    "candidates, 30 fresh streams a generation, from the weights of either rule; two and four "
+    "classes"
 )
 
 HYPOTHESES = (
@@ -288,12 +287,10 @@ HYPOTHESES = (
         "The quick fall with the number of classes is for the most part learning: the best known "
         "weights of the same neuron survive far longer than ALL's",
         "direct search on three other seeds: 9,200 against 2,200 bins at two classes, 4,400 "
-        "against 85 "
-        "at four",
+        "against 85 at four",
         _PROTOCOL,
-        f"holds if for the GNM with signed weights the mean of the best known weights over that of "
-        f"ALL "
-        f"has an interval above {TIMES[2]:g} at two classes and above {TIMES[4]:g} at four",
+        "holds if for the GNM with signed weights the mean of the best known weights over that of "
+        f"ALL has an interval above {TIMES[2]:g} at two classes and above {TIMES[4]:g} at four",
         ("CEILING",),
         _judge_height,
     ),
@@ -304,9 +301,8 @@ HYPOTHESES = (
         "classes)",
         _PROTOCOL,
         "holds if for every neuron, bounds and number of classes the mean of PeakError over that "
-        "of the "
-        f"best known weights has an interval above {REACHED:.0%}; conditional on the number of "
-        f"classes",
+        f"of the best known weights has an interval above {REACHED:.0%}; conditional on the number "
+        "of classes",
         ("CEILING",),
         _judge_rule,
     ),
@@ -367,10 +363,8 @@ PICTURES = {
         _draw,
         ("CEILING",),
         "Noisy performance (logarithmic, cap 10,000) of weights that ALL and PeakError have "
-        "learned "
-        "and of those to which CMA-ES came from each of them, by neuron and weight bounds: one "
-        "point "
-        "per pattern seed, means with 95 % bootstrap intervals. Dotted, a neuron that never "
-        "spikes.",
+        "learned and of those to which CMA-ES came from each of them, by neuron and weight bounds: "
+        "one point per pattern seed, means with 95 % bootstrap intervals. Dotted, a neuron that "
+        "never spikes.",
     )
 }

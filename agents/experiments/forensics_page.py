@@ -158,11 +158,10 @@ def page(told: dict[str, Any]) -> str:
         f"# Which protocol explains the paper, at {told['size']} size",
         "",
         f"Written by `{told['command']}`; how it is made: "
-        "[reproduction.md](../../reproduction.md). "
-        f"{tried['ways of training']} ways of training, {tried['protocols']:,} protocols, on "
-        f"pattern seeds {seeds['coarse']}; {tried['ways that went on']} ways on seeds "
-        f"{seeds['fine']} too; what follows is on seeds {seeds['confirmed']}. "
-        f"Work: {told['work']}.",
+        f"[reproduction.md](../../reproduction.md). {tried['ways of training']} ways of training, "
+        f"{tried['protocols']:,} protocols, on pattern seeds {seeds['coarse']}; "
+        f"{tried['ways that went on']} ways on seeds {seeds['fine']} too; what follows is on seeds "
+        f"{seeds['confirmed']}. Work: {told['work']}.",
         "",
         f"| protocol | points of {len(NUMBERS)} | numbers that come back |",
         "|---|---|---|",

@@ -160,8 +160,8 @@ def _judge_trap(results: Results) -> Finding:
             held[name] = middle[name] and near >= 0.9
             words.append(
                 f"{name}: measured at α = {np.median(measured):.3f}, over the prediction "
-                f"{ratio:.2f} "
-                f"({near:.0%} of the seeds within a factor of 1.5); over pN·w̄/ϑ {simple:.2f}"
+                f"{ratio:.2f} ({near:.0%} of the seeds within a factor of 1.5); over pN·w̄/ϑ "
+                f"{simple:.2f}"
             )
     return Finding(
         all(held.values()),
@@ -246,18 +246,15 @@ def _memoryless_share(scores: NDArray[np.float64]) -> float:
 
 _PROTOCOL = (
     "GNM, η 0, matched initial weights, 60,000 trials; ALL λ 1e-4 and modulated ET λ 1e-3 in [0, "
-    "1], "
-    "CriticalThreshold λ 1e-2 and PeakError λ 3e-3 unbounded, PeakError in [0, 1]; pattern seeds "
-    "100 "
-    "to 123"
+    "1], CriticalThreshold λ 1e-2 and PeakError λ 3e-3 unbounded, PeakError in [0, 1]; pattern "
+    "seeds 100 to 123"
 )
 
 HYPOTHESES = (
     Hypothesis(
         "M1",
         "At small α ALL is trapped: the neuron lies above the threshold for ever. Where that "
-        "begins "
-        "follows, seed by seed and without any fit, from the initial weights",
+        "begins follows, seed by seed and without any fit, from the initial weights",
         "Crossings of a Gaussian autoregressive process, one or two classes on pattern seeds 0 to "
         "15",
         f"GNM, η 0, ALL, λ 1e-4, {TRAP_TRIALS:,} trials, weights in [0, 1], initially up to 0.1 or "
@@ -275,24 +272,21 @@ HYPOTHESES = (
         "prototype on other seeds: ALL 280 bins, CriticalThreshold 8,200, PeakError 9,750",
         _PROTOCOL,
         "holds if at α = 0.05, one class, the mean of CriticalThreshold, of PeakError and of "
-        "PeakError "
-        f"in [0, 1] over that of ALL each has an interval above {TIMES:g} (bootstrap over seeds)",
+        f"PeakError in [0, 1] over that of ALL each has an interval above {TIMES:g} (bootstrap "
+        "over seeds)",
         ("MEMORY",),
         _judge_cliff,
     ),
     Hypothesis(
         "M3",
         "With more than one class the best α is where a leaky detector has the highest "
-        "signal-to-noise "
-        "ratio, known without any training",
+        "signal-to-noise ratio, known without any training",
         "signal-to-noise on pattern seeds 0 to 15: highest at 0.2, 0.2 and 0.3 of these α; "
-        "prototype: "
-        "best near 0.15, 0.15 and 0.1",
+        "prototype: best near 0.15, 0.15 and 0.1",
         _PROTOCOL,
         "holds if, for each number of classes above 1, the α with the best mean score of PeakError "
         "(unbounded) is at most one step of the grid from that with the best mean log ratio, and "
-        "the "
-        "rank correlation of score and ratio over seeds and α has an interval above 0.5",
+        "the rank correlation of score and ratio over seeds and α has an interval above 0.5",
         ("MEMORY",),
         _judge_optimum,
     ),
@@ -303,8 +297,8 @@ HYPOTHESES = (
         "classes",
         _PROTOCOL,
         "holds if α = 1 reaches at least 80 % of the best α's mean score (PeakError, unbounded) at "
-        "one "
-        "class and at most 50 % at every other number of classes (intervals, bootstrap over seeds)",
+        "one class and at most 50 % at every other number of classes (intervals, bootstrap over "
+        "seeds)",
         ("MEMORY",),
         _judge_need,
     ),

@@ -310,10 +310,9 @@ PICTURES = {
         _draw_volumes,
         ("F8",),
         "A trained neuron (the first pattern seed on which it is right with infinitely many "
-        "molecules) as a chemical reaction network: V of one "
-        "stochastic run with 25, 100 and 500 molecules per input spike, over the deterministic "
-        "solution (black), all with the same input. Shaded are the patterns, with the S that they "
-        "are given.",
+        "molecules) as a chemical reaction network: V of one stochastic run with 25, 100 and 500 "
+        "molecules per input spike, over the deterministic solution (black), all with the same "
+        "input. Shaded are the patterns, with the S that they are given.",
     ),
     "F8-mistakes": Picture(
         _draw_mistakes,

@@ -84,9 +84,8 @@ def _judge(results: Results) -> Finding:
     shares = share(clearly), share(on_average)
     runs = len(clearly)
     numbers = (
-        f"{clearly.sum()} of {runs} runs have an η > 0 that is ahead by more than "
-        f"{AHEAD_SIGMAS:g} standard errors: {shares[0]:.0%}; the paper's 1 of 5: "
-        f"{share(np.arange(5) < 1):.0%}",
+        f"{clearly.sum()} of {runs} runs have an η > 0 that is ahead by more than {AHEAD_SIGMAS:g} "
+        f"standard errors: {shares[0]:.0%}; the paper's 1 of 5: {share(np.arange(5) < 1):.0%}",
         f"in {on_average.sum()} the median residual over η is positive: {shares[1]:.0%}",
         f"{float((residual < 0).mean()):.0%} of all points lie below 0",
     )

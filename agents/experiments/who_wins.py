@@ -236,39 +236,34 @@ def _judge_own_cell(results: Results) -> Finding:
 
 _PROTOCOL = (
     "GNM (η 0, α 0.3), LIF (α 0.3, no refractory period) and MST; ALL (λ 1e-4), modulated ET "
-    "(3e-4), "
-    "CriticalThreshold (1e-2) and PeakError (3e-3), each at λ/3, λ and 3λ; matched and wide "
-    "initial "
-    "weights; weights in [0, 1] or signed; two classes, 60,000 trials, pattern seeds 100 to 123"
+    "(3e-4), CriticalThreshold (1e-2) and PeakError (3e-3), each at λ/3, λ and 3λ; matched and "
+    "wide initial weights; weights in [0, 1] or signed; two classes, 60,000 trials, pattern seeds "
+    "100 to 123"
 )
 
 HYPOTHESES = (
     Hypothesis(
         "W1",
         "The learning rule explains more of the differences than the neuron, and the neuron less "
-        "than "
-        "a tenth",
+        "than a tenth",
         "PROTOCOL §5 and RULES §7 on other seeds: rules differ three- to thirtyfold, neurons "
         "twofold",
         _PROTOCOL,
         "holds if the share of the variance of log mistake rate that the rule explains exceeds the "
         "neuron's, with an interval of the difference above 0, and the neuron's interval lies "
-        "below "
-        "10 % (balanced analysis of variance, bootstrap over seeds)",
+        "below 10 % (balanced analysis of variance, bootstrap over seeds)",
         ("FACTORS",),
         _judge_shares,
     ),
     Hypothesis(
         "W2",
         "Both rankings of the paper, MST below GNM and LIF below GNM, hold in some cells and "
-        "reverse "
-        "in others",
+        "reverse in others",
         "LIF over GNM was 0.63 from wide and 1.75 from matched weights on other seeds",
         _PROTOCOL,
-        f"holds if, for each, at least one of the 48 cells has the GNM ahead and at least "
+        "holds if, for each, at least one of the 48 cells has the GNM ahead and at least "
         f"{SHARE_REVERSED:.0%} have it behind (two-sided sign test over seeds, p < {LEVEL:g}, "
-        f"which is "
-        "0.05 over all cells)",
+        "which is 0.05 over all cells)",
         ("FACTORS",),
         _judge_reversals,
     ),

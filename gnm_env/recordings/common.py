@@ -87,9 +87,8 @@ def binned_trials(
     if wrong.any():
         k = int(np.argmax(wrong))
         raise ValueError(
-            f"spike times must lie within their trial, of duration "
-            f"{spikes.durations[trial[k]]:g}: channel {spikes.channel[k]} has {time[k]:g} after "
-            f"the start of trial {trial[k]}"
+            f"spike times must lie within their trial, of duration {spikes.durations[trial[k]]:g}: "
+            f"channel {spikes.channel[k]} has {time[k]:g} after the start of trial {trial[k]}"
         )
     bins = np.floor(time / bin_width + ROUNDING).astype(np.int64)
     bins = np.minimum(bins, n_bins[trial] - 1)
