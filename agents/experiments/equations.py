@@ -61,9 +61,7 @@ def balance(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (
         Axis("eta", GRID, long_name="η, model choice"),
         Axis("beta", GRID[1:], chunk=0, units="1/bin", long_name="β, recovery per bin"),
-        Axis(
-            "pattern_seed", tuple(seeds or range(SEEDS[size])), chunk=0, long_name="seed of noise"
-        ),
+        _noises(size, seeds),
     )
     variables = (
         Variable("overdraft", "float64", "1", "most that D(t) exceeds V(t−1) >= 0 by", ()),
@@ -97,11 +95,7 @@ TRACES = {"lif": LIF(alpha=LEAK, refractory=0), "gnm": STEP}
 
 def as_lif(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """The potentials of a LIF and of a GNM with h = ∞, ζ = 1, γ = 1/η on the same noise."""
-    axes = (
-        Axis(
-            "pattern_seed", tuple(seeds or range(SEEDS[size])), chunk=0, long_name="seed of noise"
-        ),
-    )
+    axes = (_noises(size, seeds),)
     variables = tuple(
         Variable(
             name, "float64", "1", f"potential of the {name.upper()}, before any reset", ("bin",)

@@ -148,8 +148,6 @@ def share_right(told: Answers, owed: tuple[int, ...]) -> NDArray[np.float64]:
 SOLVED = 0.05
 """Mean |label − emitted| over the mean label below which a task counts as solved; silence has 1."""
 TOLD_WHERE = ("GNM, PeakError", "MST, PeakError")
-TOLD_ONCE = tuple(name for name in LEARNERS if name not in TOLD_WHERE)
-"""The learners that hear one number, or its sign, at the end of a trial."""
 
 
 def values_of(data: xr.Dataset, what: str, task: str, learner: str) -> NDArray[np.float64]:

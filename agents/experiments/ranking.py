@@ -225,36 +225,6 @@ def contrasts(table: Table) -> Iterator[Contrast]:
                 )  # fmt: skip
 
 
-class Overall(NamedTuple):
-    """A learner over all numbers of classes."""
-
-    name: str
-    seeds: int
-    """Pattern seeds that are finished at each number of classes."""
-    iqm: Interval
-    """Interquartile mean over seeds and classes together."""
-
-
-def overall(table: Table, counts: Sequence[int]) -> list[Overall]:
-    """Every learner that has been scored at all of `counts`, the best first."""
-    found = []
-    for name, by_classes in table.items():
-        if all(classes in by_classes for classes in counts):
-            columns = _matrix([by_classes[classes] for classes in counts])
-            if len(columns):
-                iqm = stratified_bootstrap(middle_means, columns)
-                found.append(Overall(name, len(columns), iqm))
-    return sorted(found, key=lambda row: -row.iqm.value)
-
-
-def _matrix(columns: Sequence[Scores]) -> NDArray[np.float64]:
-    """(seeds, tasks) on the seeds that all columns have."""
-    shared = columns[0].seeds
-    for column in columns[1:]:
-        shared = np.intersect1d(shared, column.seeds)
-    return np.stack([c.bins[np.isin(c.seeds, shared)] for c in columns], axis=1)
-
-
 # --- tables --------------------------------------------------------------------------------------
 
 

@@ -133,11 +133,6 @@ def _named(
     return [name for name, names in known.items() if wanted is None or words & set(names)]
 
 
-def neuron_of(entry: str) -> str:
-    """The neuron of an entry, "network" included."""
-    return entry.partition(", ")[0]
-
-
 def rule_of(entry: str) -> str:
     """The rule of an entry."""
     return entry.partition(", ")[2]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from agents.model import Arrays
 from agents.simd import repeated, unpack
 from agents.training.slots import BIEXPONENTIAL, THRESHOLD, Parameters, State, advance
-from gnm_env.compiled import compiled
 
 
 class Again(NamedTuple):
@@ -57,12 +56,6 @@ class HeardTrial(NamedTuple):
     memory: NDArray[np.float64]
     """What the rule remembers from trial to trial, a number for each field of its `memory_type`."""
     again: Again
-
-
-@compiled
-def count_of(trial: HeardTrial) -> int:
-    """Output spikes in the whole trial."""
-    return int(trial.counts.sum() + 0.5)
 
 
 def accumulate(trial: HeardTrial, y: NDArray[np.float64], eligibility: NDArray[np.float64]) -> bool:

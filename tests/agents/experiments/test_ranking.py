@@ -40,15 +40,6 @@ def test_contrasts_are_paired_on_the_seeds_that_both_have() -> None:
     assert ("GNM, PeakError", "GNM, ET", 2) not in found
 
 
-def test_overall_puts_the_best_first_and_leaves_out_what_lacks_a_number_of_classes() -> None:
-    table = made_up()
-    del table["GNM, PeakError"][2]
-    found = ranking.overall(table, (1, 2))
-    assert [row.name for row in found[:2]] == ["GNM, CriticalThreshold", tuning.NETWORK]
-    assert "GNM, PeakError" not in {row.name for row in found}
-    assert found[0].iqm.low <= found[0].iqm.value <= found[0].iqm.high
-
-
 def test_the_tables_are_markdown_split_by_feedback() -> None:
     lines = ranking.score_table(made_up()).splitlines()
     assert len({line.count("|") for line in lines}) == 1
