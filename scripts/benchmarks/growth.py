@@ -54,6 +54,17 @@ def sizes(settings: Settings) -> Findings:
             else ""
         )
         found.curves.append(curve(name, symbol, list(by_size), timings, note=note))
+    inputs = found.curves[0]
+    found.rows.append(
+        Row(
+            SECTION,
+            f"{inputs.name}, {inputs.sizes[-1]:,}",
+            NS,
+            inputs.values[-1],
+            more_is_better=False,
+            targets=(Target(10.0),),
+        )
+    )
     return found
 
 

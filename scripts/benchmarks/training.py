@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -37,7 +37,7 @@ from agents import (
 from agents.learning.rule import Rule
 from agents.neurons.neuron import Neuron
 from benchmarks.rows import Findings, Row, Target, rate_rows
-from benchmarks.timing import Settings, Skip, Subject, Timing, race
+from benchmarks.timing import Settings, Skip, Subject, race
 from gnm_env import Patterns, Task
 from gnm_env.generators import Generators
 from gnm_env.task import task_arrays
@@ -203,59 +203,72 @@ def alone(settings: Settings) -> Findings:
     return Findings(rows=rows)
 
 
+NETWORKS = 32
+"""Networks side by side."""
+
+
 def network(settings: Settings) -> Findings:
-    """The network with 10 hidden neurons, by backpropagation."""
+    """The network with 10 hidden neurons, by backpropagation, alone and side by side."""
     try:
         from agents.network import BackPropagation, Network, NetworkAgent
     except ImportError as error:
         raise Skip(f"agents.network cannot be imported: {error}") from None
-    n_inputs = Task().n_inputs
 
-    def make() -> list[Any]:
-        return [NetworkAgent(Network(), BackPropagation(), n_inputs, seed=0)]
+    def make(n: int) -> list[Any]:
+        rule = BackPropagation()
+        return [NetworkAgent(Network(), rule, Task().n_inputs, seed=seed) for seed in range(n)]
 
-    trials = settings.trials // 10 if settings.quick else settings.trials
-    subject = learning("10 hidden, BP, one class", make, Task(), trials, settings.seed)
-    row = _per_training(
-        "Training, network and continuous time", subject, race([subject], settings), Target(6.0)
-    )
-    return Findings(rows=[row])
+    cases = {
+        "10 hidden, BP, one class": (functools.partial(make, 1), Target(6.0)),
+        f"the same, {NETWORKS} networks side by side, each": (
+            functools.partial(make, NETWORKS),
+            Target(0.4, aim=0.2),
+        ),
+    }
+    return _per_training(settings, cases)
 
 
 def continuous(settings: Settings) -> Findings:
-    """The neuron in continuous time, exact (η = 0)."""
+    """The neuron in continuous time, exact (η = 0), alone and side by side."""
     try:
         from agents.continuous import ContinuousAgent, ContinuousGNM
     except ImportError as error:
         raise Skip(f"agents.continuous cannot be imported: {error}") from None
 
-    def make() -> list[Any]:
-        return [ContinuousAgent(ContinuousGNM(), AggregateLabel(), Task().n_inputs, seed=0)]
+    def make(n: int) -> list[Any]:
+        neuron, rule, n_inputs = ContinuousGNM(), AggregateLabel(), Task().n_inputs
+        return [ContinuousAgent(neuron, rule, n_inputs, seed=seed) for seed in range(n)]
 
-    trials = settings.trials // 10 if settings.quick else settings.trials
-    subject = learning("continuous GNM η=0, ALL", make, Task(), trials, settings.seed)
-    row = _per_training(
-        "Training, network and continuous time", subject, race([subject], settings), None
-    )
-    return Findings(rows=[row])
+    cases: dict[str, tuple[Make, Target | None]] = {
+        "continuous GNM η=0, ALL": (functools.partial(make, 1), None),
+        f"the same, {LANES} neurons side by side, each": (functools.partial(make, LANES), None),
+    }
+    return _per_training(settings, cases)
 
 
-def _per_training(
-    section: str, subject: Subject, timings: dict[str, Timing], target: Target | None
-) -> Row:
+def _per_training(settings: Settings, cases: Mapping[str, tuple[Make, Target | None]]) -> Findings:
     """Seconds for a whole training of 60,000 trials, on average as long as trials are."""
     task = Task()
+    trials = settings.trials // 10 if settings.quick else settings.trials
     whole = TRIALS * (task.background_bins + task.mean_pattern_bins)
-    timing = timings[subject.name]
-    return Row(
-        section,
-        subject.name,
-        f"s per {TRIALS:,} trials",
-        tuple(seconds * whole for seconds in timing.seconds),
-        more_is_better=False,
-        targets=(target,) if target else (),
-        cpu_share=timing.cpu_share,
-    )
+    subjects = [
+        learning(name, make, task, trials, settings.seed) for name, (make, _) in cases.items()
+    ]
+    rows = []
+    for name, timing in race(subjects, settings).items():
+        target = cases[name][1]
+        rows.append(
+            Row(
+                "Training, network and continuous time",
+                name,
+                f"s per {TRIALS:,} trials",
+                tuple(seconds * whole for seconds in timing.seconds),
+                more_is_better=False,
+                targets=(target,) if target else (),
+                cpu_share=timing.cpu_share,
+            )
+        )
+    return Findings(rows=rows)
 
 
 def loop(settings: Settings) -> Findings:
