@@ -261,8 +261,7 @@ def mistakes(data: xr.Dataset, situation: str, learner: str) -> NDArray[np.float
     survived = cell.transpose("pattern_seed", "load", "run").to_numpy()
     made = (survived < data.attrs["settings"]["common"]["cap"]).sum(-1)
     each = usual_task(situation).silent_score + 1.0
-    # The bin of a mistake is heard as well.
-    return np.asarray(rate(made, survived.sum(-1) + made) * each / 1_000.0)
+    return np.asarray(rate(made, survived.sum(-1)) * each / 1_000.0)
 
 
 class Held(NamedTuple):

@@ -79,7 +79,7 @@ def mistakes(
 
 
 def fewer_mistakes(lif: NDArray[np.float64], gnm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mistakes per bin of the GNM over those of the LIF, one per refractory period.
+    """Mistakes per bin heard of the GNM over those of the LIF, one per refractory period.
 
     Seeds and runs are pooled, and half a mistake is added, so that a neuron without any has a rate.
     """

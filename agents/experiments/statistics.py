@@ -186,9 +186,12 @@ def mistake_rates(results: xr.Dataset) -> xr.DataArray:
     return rate((survived < cap).sum("run"), survived.sum("run"))
 
 
-def rate(mistakes: Any, bins: Any) -> Any:
-    """Mistakes in 1,000 bins, half a mistake added."""
-    return 1_000.0 * (mistakes + 0.5) / bins.clip(1)
+def rate(mistakes: Any, survived: Any, added: float = 0.5) -> Any:
+    """Mistakes in 1,000 bins heard: those survived, and those of the mistakes themselves.
+
+    `added` mistakes are added, so that who made none has a rate too.
+    """
+    return 1_000.0 * (mistakes + added) / (survived + mistakes).clip(1)
 
 
 def typical_rate(rates: xr.DataArray) -> xr.DataArray:
@@ -206,8 +209,7 @@ def mistakes_per_thousand(survived: ArrayLike, cap: int) -> float:
     goes on telling good from better.
     """
     bins = np.asarray(survived)
-    heard = bins.sum() + np.sum(bins < cap)  # the bin of a mistake is heard as well
-    return float(1_000.0 * np.sum(bins < cap) / heard)
+    return float(rate(np.sum(bins < cap), bins.sum(), added=0.0))
 
 
 def wins(first: ArrayLike, second: ArrayLike) -> Wins:
