@@ -48,6 +48,7 @@ BEYOND = (
     "ceiling",
     "hidden_unit",
     "when_memory",
+    "when_memory_rl",
     "capacity",
     "gutig_tasks",
 )

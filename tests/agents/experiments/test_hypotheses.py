@@ -21,7 +21,7 @@ from gnm_env import Task
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "findings"
 IDS = (
     *("M1", "M2", "M3", "M4", "W1", "W2", "W3", "C1", "C2", "C3"),
-    *("U1", "U2", "U3", "U4", "N1", "N2", "N3", "N4", "N5"),
+    *("U1", "U2", "U3", "U4", "N1", "N2", "N3", "N4", "N5", "N6", "N7"),
     *("K1", "K2", "K3", "K4", "G1", "G2", "G3", "G4"),
 )
 
