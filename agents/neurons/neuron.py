@@ -21,7 +21,7 @@ import numpy as np
 
 from agents.model import Arrays, Model, PSPKernel, Response, threshold_name
 from agents.portable import portable
-from agents.simd import like, load
+from agents.simd import fitted, like, load
 from gnm_env.compiled import inlined, specialise
 
 __all__ = ["Neuron", "PSPKernel", "Response"]
@@ -52,7 +52,9 @@ def advance_template(
     """One bin of any neuron: its input current, and its step."""
     zero = like(0.0, state[0])
     current = input_current(arrays.weights, channels, first, last, zero)
-    return step(p, static, state, current)
+    after, response = step(p, static, state, current)
+    silent = zero > zero
+    return fitted(after, state), fitted(response, Response(zero, zero, zero, zero, silent, silent))
 
 
 class _NumericFields:
@@ -93,6 +95,11 @@ class Neuron(Model):
 
     def compiled_step(self) -> tuple[str, Any]:
         """The step, compiled, and a name that tells it from every other."""
+        if not hasattr(self, "_compiled"):
+            raise ValueError(
+                f"the class {type(self).__name__} needs step, and beside it a name: "
+                "step(p, static, state, current) -> (state, Response)"
+            )
         return self._compiled
 
     def recording_step(self) -> tuple[str, Any]:
