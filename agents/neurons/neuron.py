@@ -27,6 +27,7 @@ from gnm_env.compiled import inlined, specialise
 __all__ = ["Neuron", "PSPKernel", "Response"]
 
 step: Any = None  # bound by `_advance`
+answer: Any = None  # likewise
 
 
 @inlined
@@ -53,8 +54,20 @@ def advance_template(
     zero = like(0.0, state[0])
     current = input_current(arrays.weights, channels, first, last, zero)
     after, response = step(p, static, state, current)
+    return fitted(after, state), answer(response, zero)
+
+
+@inlined
+def spiking_answer(response: Any, zero: Any) -> Any:
+    """A `Response` whose constants are numbers and conditions like any other."""
     silent = zero > zero
-    return fitted(after, state), fitted(response, Response(zero, zero, zero, zero, silent, silent))
+    return fitted(response, Response(zero, zero, zero, zero, silent, silent))
+
+
+@inlined
+def graded_answer(response: Any, zero: Any) -> Any:
+    """The response of a neuron that gives amounts, as it is."""
+    return response
 
 
 class _NumericFields:
@@ -107,20 +120,24 @@ class Neuron(Model):
         return self.compiled_step()
 
     def advance(self) -> tuple[str, Any]:
-        return _advance(self.compiled_step())
+        return _advance(self.compiled_step(), self.graded)
 
     def recording(self) -> tuple[str, Any]:
-        return _advance(self.recording_step())
+        return _advance(self.recording_step(), self.graded)
 
 
 _ADVANCES: dict[Any, Any] = {}
 """The bound template of each compiled step, so that it is compiled once."""
 
 
-def _advance(labelled: tuple[str, Any]) -> tuple[str, Any]:
+def _advance(labelled: tuple[str, Any], graded: bool) -> tuple[str, Any]:
     label, compiled_step = labelled
     if compiled_step not in _ADVANCES:
         _ADVANCES[compiled_step] = specialise(
-            advance_template, label, inline=True, step=compiled_step
+            advance_template,
+            label,
+            inline=True,
+            step=compiled_step,
+            answer=graded_answer if graded else spiking_answer,
         )
     return label, _ADVANCES[compiled_step]
