@@ -150,7 +150,11 @@ def _parameters(part: Any) -> dict[str, Any]:
             f"{part!r} cannot be saved: its parameters do not survive JSON ({error}); "
             "use numbers, texts and None"
         ) from None
-    if again != part:
+    try:
+        same = again == part
+    except ValueError:  # an array among them
+        same = False
+    if not same:
         raise ValueError(f"{part!r} cannot be saved: it would be loaded as {again!r}")
     return values
 

@@ -77,6 +77,9 @@ class Model(ABC):
     widest: ClassVar[int] = 32
     """Most models side by side in one block: with more, what they work on leaves the cache."""
 
+    needs: ClassVar[tuple[str, ...]] = ("state_type", "default_initial_weight")
+    """What a class must have to be trained."""
+
     kind: ClassVar[str] = "neuron"
     """Where it is registered: see `agents.registry`."""
 

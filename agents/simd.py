@@ -14,6 +14,7 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
     unpack(Type, block, x)   a NamedTuple whose fields are the rows of `block`
     pack(block, t)           the reverse
     repeated(Type, x)        a NamedTuple whose fields are all x
+    fitted(t, kinds)         the fields of `t`, each in the lanes and of the kind of that of `kinds`
     where(mask, x, y)        x where the mask holds, y elsewhere; both are evaluated
     seldom(mask, x, y)       as where, for a mask that seldom holds
     any_lane(mask)           whether the mask holds anywhere
@@ -25,9 +26,10 @@ Compiled code obtains values from arrays whose rows hold W numbers, one for each
     whole_power(x, n)        x**n by repeated squaring, n a whole number
     power(x, y)              x**y; one call of the C library per lane
 
-Comparisons give masks, to be joined by ``&`` and ``|``. Also ``-x``, ``x**2``, ``abs``, ``min``,
-``max`` and ``exp``, ``log``, ``sqrt`` of math and NumPy work; `exp` and `log` call the C library
-once per lane.
+Comparisons give masks, to be joined by ``&`` and ``|``; in arithmetic a mask counts 1 where it
+holds and 0 elsewhere, and as a condition a number holds where it is not 0. Also ``-x``, ``x**2``,
+``abs``, ``min``, ``max`` and ``exp``, ``log``, ``sqrt`` of math and NumPy work; `exp` and `log`
+call the C library once per lane.
 
 Rows are read and written by their addresses. With GNM_CHECKED=1 in the environment (see
 `gnm_env.compiled`) a row or a lane outside the array raises IndexError.
@@ -44,6 +46,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit
 from numba.core import cgutils, types
+from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
@@ -110,11 +113,33 @@ def _splat(builder: Any, number: Any, width: int) -> Any:
 def _spread(context: Any, builder: Any, value: Any, type_: Any, width: int) -> Any:
     if isinstance(type_, Lanes):
         return value
-    return _splat(builder, context.cast(builder, value, type_, types.float64), width)
+    if isinstance(type_, Mask):
+        return builder.uitofp(value, _vector(width))
+    number = context.cast(builder, value, types.unliteral(type_), types.float64)
+    return _splat(builder, number, width)
 
 
-_NUMBER = (types.Float, types.Integer)
-_PAIRS = [(Lanes, Lanes)] + [pair for n in _NUMBER for pair in ((Lanes, n), (n, Lanes))]
+def _spread_mask(context: Any, builder: Any, value: Any, type_: Any, width: int) -> Any:
+    """A mask, or where a number is not 0, as Python has it."""
+    if isinstance(type_, Mask):
+        return value
+    if isinstance(type_, types.Boolean):
+        return _splat(builder, value, width)
+    number = _spread(context, builder, value, type_, width)
+    return builder.fcmp_unordered("!=", number, _splat(builder, ir.Constant(_DOUBLE, 0.0), width))
+
+
+def _condition(context: Any, builder: Any, value: Any, type_: Any) -> Any:
+    """What `where` chooses by: one truth value, or one for each lane."""
+    return _spread_mask(context, builder, value, type_, _width(type_))
+
+
+_PLAIN = (types.Float, types.Integer, types.Boolean)
+_SIDE_BY_SIDE = (Lanes, Mask)
+_PAIRS = [
+    *((left, right) for left in _SIDE_BY_SIDE for right in _SIDE_BY_SIDE),
+    *(pair for x in _SIDE_BY_SIDE for n in _PLAIN for pair in ((x, n), (n, x))),
+]
 
 
 def _binary(op: Any, result: Callable[[int], types.Type], emit: Callable[..., Any]) -> None:
@@ -123,8 +148,9 @@ def _binary(op: Any, result: Callable[[int], types.Type], emit: Callable[..., An
     @infer_global(op)
     class _Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            lanes = [a for a in args if isinstance(a, Lanes)]
-            if len(args) == 2 and lanes and all(isinstance(a, (Lanes, *_NUMBER)) for a in args):
+            lanes = [a for a in args if isinstance(a, _SIDE_BY_SIDE)]
+            known = (*_SIDE_BY_SIDE, *_PLAIN)
+            if len(args) == 2 and lanes and all(isinstance(a, known) for a in args):
                 return signature(result(lanes[0].width), *args)
             return None
 
@@ -161,15 +187,23 @@ def _logical(op: Any, emit: Callable[..., Any]) -> None:
     @infer_global(op)
     class _Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == 2 and all(isinstance(a, Mask) for a in args):
-                return signature(args[0], *args)
+            masks = [a for a in args if isinstance(a, Mask)]
+            if len(args) == 2 and masks and all(isinstance(a, (Mask, types.Boolean)) for a in args):
+                return signature(masks[0], *args)
             return None
 
-    lower_builtin(op, Mask, Mask)(lambda context, builder, sig, args: emit(builder, *args))
+    def implement(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = sig.return_type.width
+        pair = zip(args, sig.args, strict=True)
+        return emit(builder, *(_spread_mask(context, builder, v, t, width) for v, t in pair))
+
+    for left, right in ((Mask, Mask), (Mask, types.Boolean), (types.Boolean, Mask)):
+        lower_builtin(op, left, right)(implement)
 
 
-_logical(operator.and_, lambda builder, x, y: builder.and_(x, y))
-_logical(operator.or_, lambda builder, x, y: builder.or_(x, y))
+for _name in ("and_", "or_", "xor"):
+    for _op in (getattr(operator, _name), getattr(operator, f"i{_name.rstrip('_')}")):
+        _logical(_op, lambda b, x, y, _emit=_name: getattr(b, _emit)(x, y))
 
 
 @_intrinsic
@@ -182,7 +216,8 @@ def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         values = zip(args[1:], sig.args[1:], strict=True)
-        return builder.select(args[0], *(_spread(context, builder, v, t, width) for v, t in values))
+        mask = _condition(context, builder, args[0], sig.args[0])
+        return builder.select(mask, *(_spread(context, builder, v, t, width) for v, t in values))
 
     return _lanes(width)(mask, x, y), generate
 
@@ -190,8 +225,8 @@ def where(typing_context: Any, mask: Any, x: Any, y: Any) -> Any:
 def _select_masks(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     width = _width(sig.return_type)
     pair = zip(args[1:], sig.args[1:], strict=True)
-    masks = (v if isinstance(t, Mask) else _splat(builder, v, width) for v, t in pair)
-    return builder.select(args[0], *masks)
+    masks = (_spread_mask(context, builder, v, t, width) for v, t in pair)
+    return builder.select(_condition(context, builder, args[0], sig.args[0]), *masks)
 
 
 @_intrinsic
@@ -258,7 +293,12 @@ def next_lane(typing_context: Any, lanes: Any) -> Any:
 @_intrinsic
 def negated(typing_context: Any, mask: Any) -> Any:
     """Where `mask` does not hold (``~`` of a plain bool is a number, hence this function)."""
-    return mask(mask), lambda context, builder, sig, args: builder.not_(args[0])
+    width = _width(mask)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.not_(_condition(context, builder, args[0], sig.args[0]))
+
+    return (Mask(width) if width > 1 else types.boolean)(mask), generate
 
 
 def _row_address(
@@ -376,6 +416,29 @@ def repeated(typing_context: Any, type_: Any, x: Any) -> Any:
 
 
 @_intrinsic
+def fitted(typing_context: Any, t: Any, kinds: Any) -> Any:
+    """The fields of `t` as a tuple of the type of `kinds`: numbers and masks, in all its lanes.
+
+    So a step may return a constant, or a mask where a number belongs; what fits costs nothing.
+    """
+    given: Any = t
+    if not isinstance(t, types.BaseTuple) or len(given) != len(kinds):
+        raise TypingError(f"{t} has not the fields of {kinds}")
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if t == kinds:
+            return args[0]
+        fields = []
+        for k, value in enumerate(cgutils.unpack_tuple(builder, args[0])):
+            kind = kinds[k]
+            spread = _spread_mask if isinstance(kind, (Mask, types.Boolean)) else _spread
+            fields.append(spread(context, builder, value, given[k], _width(kind)))
+        return context.make_tuple(builder, kinds, fields)
+
+    return kinds(t, kinds), generate
+
+
+@_intrinsic
 def multiply_add(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
     """x·y + z, rounded once: the same bits on every processor, in one step on most."""
     width = max(map(_width, (x, y, z)))
@@ -462,22 +525,30 @@ for _name, _functions in (
         _teach_function(_function, _name)
 
 
-@overload(abs, strict=False)
 def _absolute(x: Any) -> Any:
     return (lambda x: where(x < 0.0, -x, x + 0.0)) if isinstance(x, Lanes) else None
 
 
+_absolutes: tuple[Any, ...] = (abs, np.abs, np.fabs, math.fabs)
+for _function in _absolutes:
+    overload(_function, strict=False)(_absolute)
+
+
 @overload(min, strict=False)
-def _smaller(x: Any, y: Any) -> Any:
-    if not any(isinstance(value, Lanes) for value in (x, y)):
+def _smallest(x: Any, y: Any, *others: Any) -> Any:
+    if not any(isinstance(value, Lanes) for value in (x, y, *others)):
         return None
+    if others:
+        return lambda x, y, *others: min(min(x, y), *others)
     return lambda x, y: where(y < x, y, x)
 
 
 @overload(max, strict=False)
-def _larger(x: Any, y: Any) -> Any:
-    if not any(isinstance(value, Lanes) for value in (x, y)):
+def _largest(x: Any, y: Any, *others: Any) -> Any:
+    if not any(isinstance(value, Lanes) for value in (x, y, *others)):
         return None
+    if others:
+        return lambda x, y, *others: max(max(x, y), *others)
     return lambda x, y: where(y > x, y, x)
 
 
@@ -486,13 +557,23 @@ def _negative(x: Any) -> Any:
     return (lambda x: x * -1.0) if isinstance(x, Lanes) else None
 
 
-@overload(operator.pow, strict=False)
+@overload(operator.pos, strict=False)
+def _itself(x: Any) -> Any:
+    return (lambda x: x) if isinstance(x, Lanes) else None
+
+
 def _to_the_power(x: Any, y: Any) -> Any:
     if isinstance(x, Lanes) and isinstance(y, types.Integer):
         return lambda x, y: whole_power(x, y)
     if isinstance(x, Lanes):
         return lambda x, y: power(x, where(x == x, y, y))
+    if isinstance(y, Lanes):
+        return lambda x, y: power(like(x, y), y)
     return None
+
+
+for _op in (operator.pow, operator.ipow):
+    overload(_op, strict=False)(_to_the_power)
 
 
 @njit

@@ -62,7 +62,7 @@ def draw_batch(
             channels, offsets, onsets, which = longer_buffers(
                 task, channels, offsets, onsets, which, draft
             )
-        n, first = draft[0].occurrence, edge_of[drawn]
+        n, first = draft[0].presentation, edge_of[drawn]
         if first + 2 * n + 2 > edges.size:
             edges = grown(edges, first + 2 * n + 2)
             target = grown(target, edges.size)

@@ -1,4 +1,4 @@
-"""Compiled draws: noise, an occurrence of a pattern, a whole trial, a piece of the endless stream.
+"""Compiled draws: noise, a presentation of a pattern, a whole trial, a piece of the endless stream.
 
 Everything is sparse. A raster is `channels` (int32, ascending within a bin) and `offsets` (int64):
 the spikes of bin t are channels[offsets[t] : offsets[t + 1]]. The functions append to buffers that
@@ -108,7 +108,7 @@ def _fill_pattern(
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
-    """Put an occurrence of pattern `class_` at bin `bin_`, with `noise` on it; there is room.
+    """Put a presentation of pattern `class_` at bin `bin_`, with `noise` on it; there is room.
 
     `noise` is that of the task, in a place of its own since numba leaves out what a None in the
     arguments rules out: a task whose patterns come as they are compiles nothing for noise on them.
@@ -138,7 +138,7 @@ def _fill_noisy_pattern(
     offsets: NDArray[np.int64],
     bin_: int,
 ) -> None:
-    """Put an occurrence of pattern `class_` at bin `bin_`, with noise on it; there is room."""
+    """Put a presentation of pattern `class_` at bin `bin_`, with noise on it; there is room."""
     n_events = offsets[bin_]
     cells = _noisy_cells(rng, task, noise, class_)
     for m in range(1, task.pattern_bins + 1):
@@ -200,12 +200,12 @@ def _sort(values: NDArray[np.int64], start: int, stop: int) -> None:
 DRAFT = np.dtype(
     [
         ("first_bin", np.int64),
-        ("first", np.int64),  # the trial's first occurrence
-        ("class_", np.int64),  # the class whose occurrences are being drawn
-        ("count", np.int64),  # its occurrences still to be placed (−1: it has yet to be drawn)
+        ("first", np.int64),  # the trial's first presentation
+        ("class_", np.int64),  # the class whose presentations are being drawn
+        ("count", np.int64),  # its presentations still to be placed (−1: it has yet to be drawn)
         ("label", np.int64),
-        ("end", np.int64),  # the occurrence after the trial's last so far
-        ("occurrence", np.int64),  # the next to be laid out
+        ("end", np.int64),  # the presentation after the trial's last so far
+        ("presentation", np.int64),  # the next to be laid out
         ("noise_done", np.int64),  # bins of noise that are laid out
         ("position", np.int64),  # the last 1 in the present noise (−1: none yet)
         ("bin_", np.int64),  # the next bin
@@ -214,19 +214,19 @@ DRAFT = np.dtype(
 )
 """How far a trial has been drawn, so that drawing can go on in longer buffers. In arrays (1,).
 
-Once all is drawn, `bin_` and `occurrence` are those that follow the trial's last, and `label` is
+Once all is drawn, `bin_` and `presentation` are those that follow the trial's last, and `label` is
 its aggregate label.
 """
 
 
 @compiled
 def begin_trial(
-    draft: NDArray[Any], offsets: NDArray[np.int64], bin_: int, occurrence: int
+    draft: NDArray[Any], offsets: NDArray[np.int64], bin_: int, presentation: int
 ) -> None:
-    """Make `draft` one of which nothing is drawn yet, from bin `bin_` and that occurrence on."""
+    """Make `draft` one of which nothing is drawn yet, from bin `bin_` and that presentation on."""
     d = draft[0]
     d.first_bin, d.bin_ = bin_, bin_
-    d.first, d.end, d.occurrence = occurrence, occurrence, occurrence
+    d.first, d.end, d.presentation = presentation, presentation, presentation
     d.count, d.position = -1, -1
     d.class_, d.label, d.noise_done, d.n_events = 0, 0, 0, offsets[bin_]
 
@@ -269,7 +269,7 @@ def fill_trial(
     n_bins = task.background_bins + (end - d.first) * task.pattern_bins
     fits = fits and d.first_bin + n_bins < offsets.size
     k, noise_done, position, t, n_events = (
-        d.occurrence, d.noise_done, d.position, d.bin_, d.n_events
+        d.presentation, d.noise_done, d.position, d.bin_, d.n_events
     )  # fmt: skip
     done = False
     while fits and not done:
@@ -294,7 +294,7 @@ def fill_trial(
                 t += task.pattern_bins
                 n_events = offsets[t]
                 k += 1
-    d.end, d.occurrence = end, k
+    d.end, d.presentation = end, k
     d.noise_done, d.position, d.bin_, d.n_events = noise_done, position, t, n_events
     return done
 
@@ -329,23 +329,23 @@ def append_trial(
     onsets: NDArray[np.int64],
     classes: NDArray[np.int64],
     bin_: int,
-    occurrence: int,
+    presentation: int,
 ) -> tuple[
     NDArray[np.int32], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int, int, int
 ]:
-    """Append one trial, its first bin being bin `bin_`, its first occurrence number `occurrence`.
+    """Append one trial; bin `bin_` is its first bin, number `presentation` its first presentation.
 
     `fill_trial` for those who do not count nanoseconds. Returns the four buffers, the bin and the
-    number of the occurrence that follow the trial's last, and the aggregate label.
+    number of the presentation that follow the trial's last, and the aggregate label.
     """
     draft = np.zeros(1, DRAFT)
-    begin_trial(draft, offsets, bin_, occurrence)
+    begin_trial(draft, offsets, bin_, presentation)
     while not fill_trial(rng, task, channels, offsets, onsets, classes, draft):
         channels, offsets, onsets, classes = longer_buffers(
             task, channels, offsets, onsets, classes, draft
         )
     d = draft[0]
-    return channels, offsets, onsets, classes, d.bin_, d.occurrence, d.label
+    return channels, offsets, onsets, classes, d.bin_, d.presentation, d.label
 
 
 @compiled

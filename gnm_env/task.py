@@ -54,12 +54,12 @@ class Task:
         targets: output spikes owed per class, one whole number >= 0 each; 0 makes the class a
             distractor. None means (1, 2, …, C).
         background_bins: noise bins in a trial, into which the patterns are inserted.
-        mean_occurrences: mean of the Poisson number of occurrences per class and trial.
+        mean_occurrences: mean of the Poisson number of presentations per class and trial.
         onset_probability: q, probability that a pattern starts, per noise bin of the endless
             stream.
-        jitter_bins: j; each spike of each occurrence is moved by an integer uniform on −j … j and
+        jitter_bins: j; each spike of each presentation is moved by an integer uniform on −j … j and
             held at the pattern's first or last bin where that would carry it outside.
-        deletion: probability that a spike of an occurrence is dropped.
+        deletion: probability that a spike of a presentation is dropped.
         rates: in place of `rate` one probability for each channel, say those of a recording
             (`Trials.rates`); `rate` is then their mean.
     """
@@ -347,7 +347,7 @@ def _scatter(channels: NDArray[Any], offsets: NDArray[Any], raster: NDArray[Any]
 
 
 class PatternNoise(NamedTuple):
-    """Noise on the occurrences of patterns; see the fields of `Task`."""
+    """Noise on the presentations of patterns; see the fields of `Task`."""
 
     jitter_bins: int
     deletion: float

@@ -18,6 +18,7 @@ from agents import load_checkpoint
 from agents.commands.scoring import report, score
 from agents.commands.terminal import EVALUATION_SEED, Parser, at_least, share
 from gnm_env import Patterns, Task
+from gnm_env.rules import MAX_EPISODE_BINS
 
 
 def options(parser: Parser) -> None:
@@ -25,8 +26,8 @@ def options(parser: Parser) -> None:
     # fmt: off
     add("checkpoint", type=Path, help="a file of gnm train or a folder of gnm train-rl")
     share(parser, "--runs")
-    add("--cap", type=at_least(1), default=10_000, metavar="N",
-        help="most bins per run (default 10000)")
+    add("--cap", type=at_least(1), default=MAX_EPISODE_BINS, metavar="N",
+        help=f"most bins per run (default {MAX_EPISODE_BINS})")
     add("--trials", type=at_least(1), default=2_000, metavar="N",
         help="trials for the table of responses (default 2000)")
     share(parser, "--seed", default=EVALUATION_SEED, help="of the first stream")

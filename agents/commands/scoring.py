@@ -9,6 +9,7 @@ import numpy as np
 from agents import answers, bootstrap_interval, mistake_rate, noisy_performance
 from agents.commands.terminal import EVALUATION_SEED
 from gnm_env import Patterns, Task
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 
 
 def score(
@@ -16,8 +17,8 @@ def score(
     task: Task,
     patterns: Patterns,
     *,
-    runs: int = 100,
-    cap: int = 10_000,
+    runs: int = RUNS,
+    cap: int = MAX_EPISODE_BINS,
     seed: int = EVALUATION_SEED,
     trials: int = 2_000,
 ) -> dict[str, Any]:

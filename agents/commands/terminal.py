@@ -15,6 +15,8 @@ from typing import Any, NoReturn
 
 from gymnasium.error import DependencyNotInstalled
 
+from gnm_env.rules import RUNS
+
 RESULTS = Path("results")
 REPORT = RESULTS / "report"
 EVALUATION_SEED = 1_000_000
@@ -126,7 +128,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "--json": {"action": "store_true", "help": "end with one line of JSON"},
     "--seed": {"type": at_least(0), "default": 0, "metavar": "N"},
     "--pattern-seed": {"type": at_least(0), "metavar": "N", "help": "of the patterns (default 0)"},
-    "--runs": {"type": at_least(1), "default": 100, "metavar": "N"},
+    "--runs": {"type": at_least(1), "default": RUNS, "metavar": "N"},
     "--out": {"type": Path, "metavar": "FOLDER"},
     "--size": {"choices": ("quick", "paper"), "default": "quick"},
     "--results": {

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agents.continuous.agent import ContinuousAgent
 from agents.continuous.simulate import InputSpikes, Trajectory, simulate
+from gnm_env.rules import too_few, too_many
 from gnm_env.task import Patterns, Task
 from gnm_env.trial import Trial, draw_trial
 
@@ -44,32 +45,32 @@ def at_edges(agent: ContinuousAgent, trial: Trial) -> Amounts:
     return simulate(agent.neuron, agent.weights, InputSpikes.from_trial(trial), at).S
 
 
-def in_occurrences(trial: Trial, S: Amounts) -> Amounts:
-    """S given in each occurrence, (…, K), from S at the edges, (…, T + 1)."""
+def in_presentations(trial: Trial, S: Amounts) -> Amounts:
+    """S given in each presentation, (…, K), from S at the edges, (…, T + 1)."""
     return S[..., trial.ends] - S[..., trial.onsets]
 
 
 def in_noise(trial: Trial, S: Amounts) -> Amounts:
-    """S given in each stretch of noise, (…, K + 1), some of them empty; `S` as for occurrences."""
+    """S given in each stretch of noise, (…, K + 1), some of them empty; `S` as above."""
     begins = np.concatenate([[0], trial.ends])
     ends = np.concatenate([trial.onsets, [trial.n_bins]])
     return S[..., ends] - S[..., begins]
 
 
 def wrong_outputs(trial: Trial, S: Amounts) -> NDArray[np.int64]:
-    """Wrong outputs in a trial, (…): occurrences whose rounded S is not what they are owed, and
-    stretches of noise with more than ½."""
-    missed = np.floor(in_occurrences(trial, S) + 0.5) != trial.targets
-    false_alarms = in_noise(trial, S) > 0.5
-    return missed.sum(-1) + false_alarms.sum(-1)
+    """Wrong outputs in a trial, (…): segments that have more or less than they are owed."""
+    given, noise = in_presentations(trial, S), in_noise(trial, S)
+    wrong = too_many(given, trial.targets) | too_few(given, trial.targets)
+    false_positives = too_many(noise, 0)
+    return wrong.sum(-1) + false_positives.sum(-1)
 
 
 def outputs_in_trials(
     agent: ContinuousAgent, task: Task, patterns: Patterns, trials: int = 500, seed: int = 0
 ) -> list[Amounts]:
-    """S of every occurrence in `trials` trials drawn from `seed`, one array for each class."""
+    """S of every presentation in `trials` trials drawn from `seed`, one array for each class."""
     rng = np.random.default_rng(seed)
     heard = [draw_trial(task, patterns, rng) for _ in range(trials)]
-    S = np.concatenate([in_occurrences(trial, at_edges(agent, trial)) for trial in heard])
+    S = np.concatenate([in_presentations(trial, at_edges(agent, trial)) for trial in heard])
     classes = np.concatenate([trial.classes for trial in heard])
     return [S[classes == c] for c in range(task.n_classes)]

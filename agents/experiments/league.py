@@ -31,6 +31,7 @@ from agents.experiments.training import (
 from agents.plotting import BINS, OKABE_ITO
 from agents.registry import find_model, find_rule
 from gnm_env import Patterns, PatternStreamEnv, Task
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.sampling import append_piece, new_buffers
 from gnm_env.task import task_arrays
 
@@ -52,7 +53,7 @@ MATCHED = {1: 1_600_000, 2: 4_000_000, 3: 4_000_000, 4: 4_000_000}
 """Bins at which all are compared, by number of classes: PPO's budget."""
 
 PARTS = ("neurons", "rl")
-RUN: dict[str, Any] = {"runs": 100, "cap": 10_000}
+RUN: dict[str, Any] = {"runs": RUNS, "cap": MAX_EPISODE_BINS}
 SEEDS = {"quick": (3, 1), "full": (10, 10)}
 """Number of pattern seeds of the neurons, and of the RL agents."""
 CLASSES = {"quick": (1,), "full": (1, 2, 3, 4)}
@@ -351,7 +352,7 @@ PICTURED = {1, 2, 3}
 """Numbers of classes that are drawn; with more, all but PPO stay near silence."""
 
 SILENT_SCORE = Task().silent_score
-CAP = 10_000
+CAP = MAX_EPISODE_BINS
 
 
 class Style(NamedTuple):

@@ -13,7 +13,7 @@ from agents.chemistry import Course, ReactionNetwork, Reactor
 from agents.chemistry.mistakes import Mistakes, count_mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN
 from agents.continuous import InputSpikes, ReactingGNM
-from agents.continuous.outputs import in_occurrences, outputs_alone
+from agents.continuous.outputs import in_presentations, outputs_alone
 from agents.experiments.continuous_time import CLASSES, first_stored, threshold_line, trained
 from agents.experiments.design import Block, Coordinate, Experiment, Variable
 from agents.experiments.figures import Picture
@@ -261,7 +261,7 @@ def draw_volumes(trial: Trial, deterministic: Course, stochastic: Mapping[int, C
 def given(trial: Trial, course: Course) -> NDArray[np.float64]:
     """S of each presentation, (K,) or (runs, K)."""
     S = course.S()
-    return in_occurrences(trial, S[..., :: (S.shape[-1] - 1) // trial.n_bins])
+    return in_presentations(trial, S[..., :: (S.shape[-1] - 1) // trial.n_bins])
 
 
 def _print_amounts(axis: Axes, trial: Trial, course: Course) -> None:

@@ -17,9 +17,10 @@ from agents.registry import find_model, find_rule
 from gnm_env import Patterns, Task, Trials
 from gnm_env.checks import MAX_BINS, flag, shown, whole
 from gnm_env.levels import evaluation_seed
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import MAX_CLASSES
 
-RUN: dict[str, Any] = {"trials": 60_000, "runs": 100, "cap": 10_000}
+RUN: dict[str, Any] = {"trials": 60_000, "runs": RUNS, "cap": MAX_EPISODE_BINS}
 """The paper's training length and measure."""
 
 WIDE_START = {"gnm": 0.3, "mst": 0.2, "lif": 0.5}

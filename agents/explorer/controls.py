@@ -18,6 +18,7 @@ from agents import registry
 from agents.commands.fields import field_help
 from agents.experiments.models import default_rule, new_agent
 from gnm_env import Task
+from gnm_env.colours import CLASS_COLOURS, as_hex
 
 Control = dict[str, Any]
 """One thing to set, ready for JSON: key, kind, symbol, help, default, and for numbers a range."""
@@ -42,6 +43,7 @@ def schema() -> dict[str, Any]:
             for cls in rules.values()
         ],
         "task": controls(Task, "t", TASK_FIRST),
+        "class_colours": [as_hex(colour) for colour in CLASS_COLOURS],
     }
 
 

@@ -265,6 +265,11 @@ class Rule(ABC):
                 f"{type(self).__name__} is for neurons that spike; a {type(model).__name__} gives "
                 "amounts, and learns by AggregateLabel, ErrorTrace or SurrogateGradient"
             )
+        if own is None and model.kind == "neuron":
+            raise ValueError(
+                f"{type(self).__name__} needs the response of a {type(model).__name__} to one unit "
+                "spike: give it a method psp_kernel that returns a PSPKernel"
+            )
         if own is None:
             raise ValueError(
                 f"{type(self).__name__} is for neurons whose potential is linear in their inputs; "

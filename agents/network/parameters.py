@@ -126,7 +126,7 @@ def _checked_hidden(value: Any) -> int:
 class BackPropagation(Rule):
     """Backpropagation of the error trace (BP): ascend J = Σ_t E(t) V(t), with E held fixed.
 
-    E(t) is, over each occurrence of a pattern, the spikes that it is owed less those given in it,
+    E(t) is, over each presentation of a pattern, the spikes that it is owed less those given in it,
     and over noise −1 where `noise_error` says. The gradient is exact, through time and through the
     inhibition. Raises ValueError if a parameter is out of range.
 
@@ -136,7 +136,7 @@ class BackPropagation(Rule):
         momentum: fraction of the previous weight change that is added, 0 … 1.
         noise_error: where in noise E is −1: "above", in every bin with V ≥ ϑ_R, or "spikes", only
             in those with an output spike.
-        lift_above: whether an occurrence that is owed more spikes raises V in all of its bins, as
+        lift_above: whether a presentation that is owed more spikes raises V in all of its bins, as
             in error-trace learning, or only in those with V < ϑ_R: an upward crossing cannot begin
             in the others, and raising them too keeps a network that is above threshold for long
             there for ever.

@@ -21,12 +21,13 @@ import numpy as np
 
 from agents.model import Arrays, Model, PSPKernel, Response, threshold_name
 from agents.portable import portable
-from agents.simd import like, load
+from agents.simd import fitted, like, load
 from gnm_env.compiled import inlined, specialise
 
 __all__ = ["Neuron", "PSPKernel", "Response"]
 
 step: Any = None  # bound by `_advance`
+answer: Any = None  # likewise
 
 
 @inlined
@@ -52,7 +53,21 @@ def advance_template(
     """One bin of any neuron: its input current, and its step."""
     zero = like(0.0, state[0])
     current = input_current(arrays.weights, channels, first, last, zero)
-    return step(p, static, state, current)
+    after, response = step(p, static, state, current)
+    return fitted(after, state), answer(response, zero)
+
+
+@inlined
+def spiking_answer(response: Any, zero: Any) -> Any:
+    """A `Response` whose constants are numbers and conditions like any other."""
+    silent = zero > zero
+    return fitted(response, Response(zero, zero, zero, zero, silent, silent))
+
+
+@inlined
+def graded_answer(response: Any, zero: Any) -> Any:
+    """The response of a neuron that gives amounts, as it is."""
+    return response
 
 
 class _NumericFields:
@@ -93,6 +108,11 @@ class Neuron(Model):
 
     def compiled_step(self) -> tuple[str, Any]:
         """The step, compiled, and a name that tells it from every other."""
+        if not hasattr(self, "_compiled"):
+            raise ValueError(
+                f"the class {type(self).__name__} needs step, and beside it a name: "
+                "step(p, static, state, current) -> (state, Response)"
+            )
         return self._compiled
 
     def recording_step(self) -> tuple[str, Any]:
@@ -100,20 +120,24 @@ class Neuron(Model):
         return self.compiled_step()
 
     def advance(self) -> tuple[str, Any]:
-        return _advance(self.compiled_step())
+        return _advance(self.compiled_step(), self.graded)
 
     def recording(self) -> tuple[str, Any]:
-        return _advance(self.recording_step())
+        return _advance(self.recording_step(), self.graded)
 
 
 _ADVANCES: dict[Any, Any] = {}
 """The bound template of each compiled step, so that it is compiled once."""
 
 
-def _advance(labelled: tuple[str, Any]) -> tuple[str, Any]:
+def _advance(labelled: tuple[str, Any], graded: bool) -> tuple[str, Any]:
     label, compiled_step = labelled
     if compiled_step not in _ADVANCES:
         _ADVANCES[compiled_step] = specialise(
-            advance_template, label, inline=True, step=compiled_step
+            advance_template,
+            label,
+            inline=True,
+            step=compiled_step,
+            answer=graded_answer if graded else spiking_answer,
         )
     return label, _ADVANCES[compiled_step]

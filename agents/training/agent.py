@@ -256,6 +256,12 @@ class Agent:
                 f"{role} must be one of {_names(expected)}, or a class of yours derived from "
                 f"{expected.__name__}, got {model!r}{hint}"
             )
+        missing = [name for name in model.needs if not hasattr(model, name)]
+        if missing:
+            raise ValueError(
+                f"the class {type(model).__name__} needs {missing[0]}; write, beside its fields, "
+                f"{missing[0]}: ClassVar[Any] = …"
+            )
         return model
 
     # --- the standard loop -----------------------------------------------------------------------

@@ -197,6 +197,10 @@ def lane_groups(agents: Sequence[Any], source: Source, threads: int) -> list[Any
     if not isinstance(agents, Sequence) or len(agents) == 0:
         raise ValueError(f"agents must be a list of at least one agent, got {agents!r}")
     for place, agent in enumerate(agents):
+        if isinstance(agent, type):
+            raise ValueError(
+                f"agents must be instances, got the class {agent.__name__} as agent {place}"
+            )
         if not hasattr(agent, "group_key"):
             raise ValueError(
                 f"agents must be agents, such as NeuronAgent makes, got {agent!r} as agent {place}"

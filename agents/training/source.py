@@ -10,6 +10,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from gnm_env.batches import Batch, DataAhead, draw_batch, new_batch, take_batch
+from gnm_env.checks import shown
 from gnm_env.task import Patterns, Task, task_arrays
 from gnm_env.trial import Trial, draw_trial
 from gnm_env.trials import Trials
@@ -143,6 +144,5 @@ def source_of(task: Any, patterns: Any = None) -> Source:
     if isinstance(task, Task):
         return TaskSource(task, patterns)
     raise ValueError(
-        f"task must be a gnm_env.Task, with patterns after it, or gnm_env.Trials, "
-        f"got {type(task).__name__}"
+        f"task must be a gnm_env.Task, with patterns after it, or gnm_env.Trials, got {shown(task)}"
     )

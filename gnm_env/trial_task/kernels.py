@@ -130,7 +130,7 @@ def _draw_trials(state: Any, which: NDArray[np.int64], first: int, is_new: bool)
         if is_new:
             begin_trial(draft, offsets, 0, 0)
         fits = fill_trial(rngs[i], task, channels, offsets, onsets, classes, draft)
-        n_bins, n_presentations = draft[0].bin_, draft[0].occurrence
+        n_bins, n_presentations = draft[0].bin_, draft[0].presentation
         fits = fits and offsets[n_bins] < events.shape[1]
         fits = fits and n_presentations <= presentations.shape[1]
         if fits:
@@ -174,7 +174,7 @@ def _draw_room(state: Any, i: int) -> None:
     )
     draft = room.draft[0]
     ahead.events = widened(ahead.events, draft.n_events + 1)
-    ahead.presentations = widened(ahead.presentations, draft.occurrence)
+    ahead.presentations = widened(ahead.presentations, draft.presentation)
 
 
 @compiled

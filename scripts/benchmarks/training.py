@@ -40,6 +40,7 @@ from benchmarks.rows import Findings, Row, Target, rate_rows
 from benchmarks.timing import Settings, Skip, Subject, race
 from gnm_env import Patterns, Task
 from gnm_env.generators import Generators
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import task_arrays
 from gnm_env.trial import draw_next
 
@@ -53,7 +54,6 @@ TRIALS = 60_000
 MAP_PART = {False: 393, True: 65}
 """Cells per pattern seed that stand for the 1,681, quick or not. Two threads share them less evenly
 than the 1,681, so that the estimate is rather too long."""
-RUNS, CAP = 100, 10_000
 """The paper's measure: streams, and most bins of each."""
 
 Make = Callable[[], list[Any]]
@@ -369,4 +369,4 @@ def _train_and_score(
     task = Task()
     patterns = Patterns.draw(task, pattern_seed)
     train_many(agents, task, patterns, trials, pattern_seed, threads)
-    noisy_performance(agents, task, patterns, RUNS, CAP, 1_000, threads=threads)
+    noisy_performance(agents, task, patterns, RUNS, MAX_EPISODE_BINS, 1_000, threads=threads)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -397,3 +399,12 @@ def test_who_learned_from_few_labels_is_scored_on_all_of_them() -> None:
     assert max(BUSY.owed) > 1
     assert noisy_performance(agent, BUSY, BUSY_PATTERNS, runs=2, cap=20, seed=1).shape == (2,)
     assert answers(agent, BUSY, BUSY_PATTERNS, trials=5).wrong.shape == (1,)
+
+
+def test_defaults_of_cap_and_runs_are_written_in_one_place() -> None:
+    written = re.compile(r"(cap|runs)(: int)?( =|=|\":|\", ?type=.*default=) ?(100|10_?000)\b")
+    root = Path(__file__).parents[2]
+    files = [file for folder in ("gnm_env", "agents") for file in (root / folder).rglob("*.py")]
+    own = {"capacity.py"}  # whose measure is another
+    found = [f.name for f in files if f.name not in own and written.search(f.read_text())]
+    assert found == []

@@ -1,7 +1,9 @@
 // Drawing on canvases: axes, lines and the pictures of the page. Nothing is computed here.
 
-const CLASSES = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#aaa014"];
-export const classColour = (k) => CLASSES[k % CLASSES.length];
+let classes = ["black"];
+// Colours of the classes, as the server names them; they come round again.
+export const setClassColours = (named) => { classes = named; };
+export const classColour = (k) => classes[k % classes.length];
 
 export function colours() {
   const style = getComputedStyle(document.documentElement);

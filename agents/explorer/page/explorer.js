@@ -1,6 +1,6 @@
 // The page: settings to a link, the link to the server, its answer to pictures.
 
-import { drawCurve, drawTrial, drawWeights, wholePicture } from "/page/draw.js";
+import { drawCurve, drawTrial, drawWeights, setClassColours, wholePicture } from "/page/draw.js";
 import { openGame } from "/page/game.js";
 
 const $ = (id) => document.getElementById(id);
@@ -393,6 +393,7 @@ function wire() {
     run();
   });
   $("mute").addEventListener("change", () => set("mute", $("mute").checked ? "1" : "0", false));
+  setClassColours(schema.class_colours);
   schema.presets.forEach((one, k) => $("presets").add(new Option(one.title, k)));
   $("presets").addEventListener("change", () => {
     const one = schema.presets[$("presets").value];

@@ -10,12 +10,13 @@ wrong, and so learns to count. Here each step is one call, and each result is lo
 # The task
 # --------
 # A task says how patterns and noise are made; patterns are drawn once and stay. Here two classes:
-# an occurrence of the first is owed one output spike, one of the second two.
+# a presentation of the first is owed one output spike, one of the second two.
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from agents import GNM, ErrorTrace, NeuronAgent, answers, noisy_performance, record, train_many
+from agents.plotting import class_colour
 from gnm_env import Patterns, Task, draw_trial
 
 task = Task(n_classes=2)
@@ -29,13 +30,12 @@ print(task)
 # shade is what the neuron is not shown.
 
 trial = draw_trial(task, patterns, np.random.default_rng(3))
-COLOURS = ("tab:blue", "tab:orange")
 
 
 def shade(axes, trial):
-    """Marks each occurrence by the colour of its class."""
+    """Marks each presentation by the colour of its class."""
     for onset, class_ in zip(trial.onsets, trial.classes, strict=True):
-        axes.axvspan(onset, onset + trial.pattern_bins, color=COLOURS[class_], alpha=0.2, lw=0)
+        axes.axvspan(onset, onset + trial.pattern_bins, color=class_colour(class_), alpha=0.2, lw=0)
 
 
 _, axes = plt.subplots(figsize=(9, 3), layout="constrained")

@@ -24,7 +24,7 @@ from agents.continuous import ContinuousAgent, ContinuousGNM, InputSpikes, simul
 from agents.continuous.outputs import (
     at_edges,
     in_noise,
-    in_occurrences,
+    in_presentations,
     outputs_alone,
     outputs_in_trials,
     wrong_outputs,
@@ -100,7 +100,7 @@ def test_error_trace_learning_follows_its_equation() -> None:
     E = -(np.diff(S) > 0.0).astype(float)
     assert E.any()
     for k, onset in enumerate(trial.onsets):
-        E[onset : onset + trial.pattern_bins] = trial.targets[k] - in_occurrences(trial, S)[k]
+        E[onset : onset + trial.pattern_bins] = trial.targets[k] - in_presentations(trial, S)[k]
     x = np.zeros((trial.n_bins, TASK.n_inputs))
     for t, bits in enumerate(trial.dense()):
         x[t] = (x[t - 1] * np.exp(-alpha) if t else 0.0) + bits
@@ -246,7 +246,7 @@ def test_answers_are_rounded_sums() -> None:
     wrong = false_alarms = 0
     for trial in trials:
         S = at_edges(agent, trial)
-        np.add.at(table, (trial.classes, np.rint(in_occurrences(trial, S)).astype(int)), 1)
+        np.add.at(table, (trial.classes, np.rint(in_presentations(trial, S)).astype(int)), 1)
         wrong += np.rint(S[-1]) != trial.label
         false_alarms += np.rint(in_noise(trial, S)).sum()
     assert np.array_equal(found.table[0], table)
@@ -254,16 +254,17 @@ def test_answers_are_rounded_sums() -> None:
     assert found.false_positives[0] == false_alarms
 
 
-def test_wrong_outputs_are_missed_occurrences_and_false_alarms() -> None:
+def test_wrong_outputs_are_segments_with_more_or_less_than_owed_and_half_is_too_much() -> None:
     task = Task(n_inputs=2, n_classes=2, pattern_bins=2)
     trial = Trial.from_dense(np.zeros((8, 2)), [1, 4], [0, 1], task)
     steps = np.array([
-        [0.0, 0.5, 0.6, 0.0, 1.0, 1.0, 0.2, 0.3],  # right everywhere
-        [0.6, 0.5, 0.6, 0.0, 1.0, 1.0, 0.2, 0.3],  # noise before the first
+        [0.0, 0.5, 0.6, 0.0, 1.0, 1.0, 0.2, 0.2],  # right everywhere
+        [0.6, 0.5, 0.6, 0.0, 1.0, 1.0, 0.2, 0.2],  # noise before the first
+        [0.5, 0.5, 0.6, 0.0, 1.0, 1.0, 0.2, 0.2],  # exactly ½ in noise, a mistake as in a stream
         [0.0, 0.2, 0.2, 0.0, 1.0, 1.6, 0.2, 0.4],  # too few, too many, noise at the end
     ])  # fmt: skip
-    S = np.concatenate([np.zeros((3, 1)), np.cumsum(steps, axis=1)], axis=1)
-    assert wrong_outputs(trial, S).tolist() == [0, 1, 3]
+    S = np.concatenate([np.zeros((4, 1)), np.cumsum(steps, axis=1)], axis=1)
+    assert wrong_outputs(trial, S).tolist() == [0, 1, 1, 3]
 
 
 def test_training_brings_the_sum_near_what_is_owed() -> None:

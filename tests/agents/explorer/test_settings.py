@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from agents.explorer import controls
 from agents.explorer.presets import PRESETS, known, presets
 from agents.explorer.settings import Settings, parse
 from gnm_env import Task
+from gnm_env.colours import as_hex, class_colour
 
 
 def test_no_link_is_the_defaults() -> None:
@@ -126,3 +128,11 @@ def test_the_agent_of_a_link_is_the_one_of_the_library() -> None:
     agent = parse({"seed": "5", "initial_weight": "0.3"}).agent()
     drawn = np.random.default_rng((5, 2)).random(100) * 0.3
     assert np.array_equal(agent.weights, drawn)
+
+
+def test_classes_have_the_colours_of_every_other_picture() -> None:
+    colours = controls.schema()["class_colours"]
+    assert colours == [as_hex(class_colour(k)) for k in range(len(colours))]
+    page = Path(controls.__file__).parent / "page"
+    written = "".join(file.read_text().lower() for file in page.glob("*.js"))
+    assert not any(f'"{colour}"' in written for colour in colours)

@@ -321,3 +321,16 @@ def test_what_names_no_class_is_refused(spec: Any) -> None:
 def test_a_rule_is_tried_on_a_neuron(neuron: Any) -> None:
     with pytest.raises(ValueError, match="neuron must be an instance of a class derived from Neur"):
         check_rule(AggregateLabel(), neuron)
+
+
+def test_a_class_among_the_agents_is_told_so() -> None:
+    with pytest.raises(ValueError, match="must be instances, got the class NeuronAgent as agent 0"):
+        train_many([NeuronAgent], BUSY, BUSY_PATTERNS, trials=3, seed=1)
+
+
+def test_parameters_that_hold_an_array_are_refused_by_a_sentence(tmp_path: Path) -> None:
+    body = {"name": "array-held", "__annotations__": {"held": Any}, "held": None}
+    holding = dataclass(frozen=True)(type("Holding", (ALIF,), {**body, "__module__": __name__}))
+    agent = NeuronAgent(holding(held=np.zeros(3)), AggregateLabel(), 10)
+    with pytest.raises(ValueError, match=r"Holding\(.* cannot be saved: it would be loaded as"):
+        agent.save(tmp_path / "agent.npz")
