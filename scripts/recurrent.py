@@ -24,6 +24,7 @@ import numpy as np
 import torch
 
 from agents import noisy_performance
+from agents.commands.terminal import Parser, at_least, run
 from agents.rl import HYPERPARAMETERS, RAW, SB3Agent, make_rl_agent, training_env
 from gnm_env import Patterns, Task
 
@@ -50,7 +51,9 @@ class AsSampled:
         return self._agent.predict(observation, state, episode_start, deterministic=False)
 
 
-def row(name: str, task: Task, patterns: Patterns, options: argparse.Namespace) -> str:
+def trained(
+    name: str, task: Task, patterns: Patterns, options: argparse.Namespace
+) -> dict[str, float]:
     """Train and score one variant."""
     HYPERPARAMETERS[name] = VARIANTS[name]
     env = training_env(task, patterns, name, feedback=options.feedback)
@@ -63,30 +66,39 @@ def row(name: str, task: Task, patterns: Patterns, options: argparse.Namespace) 
         noisy_performance(one, task, patterns, seed=1_000_000, threads=1).mean()
         for one in (agent, AsSampled(agent))
     )
-    reward = np.mean([episode["r"] for episode in model.ep_info_buffer or ()])
-    return (
-        f"| {name} | {reward:.2f} | {best:,.0f} | {sampled:,.0f} | "
-        f"{model.num_timesteps / seconds:,.0f} |"
-    )
+    return {
+        "reward": float(np.mean([episode["r"] for episode in model.ep_info_buffer or ()])),
+        "score": float(best),
+        "as sampled": float(sampled),
+        "bins/s": model.num_timesteps / seconds,
+    }
 
 
-def main() -> None:
+def options(parser: Parser) -> None:
+    add = parser.add_argument
+    add("--n-classes", type=at_least(1), default=1, metavar="N")
+    add("--pattern-seed", type=at_least(0), default=0, metavar="N")
+    add("--seed", type=at_least(0), default=0, metavar="N", help="of the training")
+    add("--feedback", choices=("cost", "dense"), default="dense")
+    add("--steps", type=at_least(1), default=600_000, metavar="N", help="bins to hear")
+    add("--only", choices=tuple(VARIANTS), action="append")
+
+
+def main(options: argparse.Namespace) -> dict[str, Any]:
     """Print a row per variant."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--n-classes", type=int, default=1)
-    parser.add_argument("--pattern-seed", type=int, default=0)
-    parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument("--feedback", choices=("cost", "dense"), default="dense")
-    parser.add_argument("--steps", type=int, default=600_000, help="bins to hear")
-    parser.add_argument("--only", choices=tuple(VARIANTS), action="append")
-    options = parser.parse_args()
     torch.set_num_threads(1)  # on networks this small, threads only get in each other's way
     task = Task(n_classes=options.n_classes)
     patterns = Patterns.draw(task, options.pattern_seed)
     print("| | reward per trial | score | as sampled | bins/s |\n|---|---|---|---|---|")
+    rows = {}
     for name in options.only or VARIANTS:
-        print(row(name, task, patterns, options), flush=True)
+        rows[name] = trained(name, task, patterns, options)
+        reward, best, sampled, speed = rows[name].values()
+        print(
+            f"| {name} | {reward:.2f} | {best:,.0f} | {sampled:,.0f} | {speed:,.0f} |", flush=True
+        )
+    return {"rows": rows}
 
 
 if __name__ == "__main__":
-    main()
+    run(lambda: sys.modules[__name__], sys.argv[1:], "recurrent.py")
