@@ -33,6 +33,7 @@ from typing import Any
 
 import llvmlite
 import numba
+import numpy as np
 from numba import njit
 from numba import types as numba_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserWideCacheLocator
@@ -251,6 +252,10 @@ def _warn(reason: str) -> None:
         )
 
 
+_CONSTANTS = (bool, int, float, complex, str, bytes, tuple, np.dtype, np.generic)
+"""What compiled code takes over from a global name, and `repr` tells whole."""
+
+
 def _digest(function: Any) -> str:
     """A digest of the sources and constants that the compiled `function` rests on.
 
@@ -278,7 +283,7 @@ def _digest(function: Any) -> str:
             value = current.__globals__[name]
             if isinstance(value, Dispatcher):
                 waiting.append(value.py_func)
-            elif isinstance(value, (bool, int, float, str)):
+            elif isinstance(value, _CONSTANTS):
                 constants.append(f"{current.__qualname__}.{name}={value!r}")
             else:
                 others.append(value)

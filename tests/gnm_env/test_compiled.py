@@ -103,6 +103,33 @@ def test_an_edit_to_a_bound_function_of_another_package_is_noticed(tmp_path: Pat
     assert answer(5) == ("16", "0")
 
 
+@pytest.mark.parametrize(
+    ("first", "second"), [("(1, 2)", "(5, 2)"), ("np.dtype([('a', 'i8')])", "np.dtype('i2')")]
+)
+def test_an_edit_to_a_constant_in_another_file_is_noticed(
+    tmp_path: Path, first: str, second: str
+) -> None:
+    """Of a file of which nothing else is used: a tuple, the type of a record."""
+    (tmp_path / "user.py").write_text(
+        "import numpy as np\n"
+        "from gnm_env.compiled import compiled\n"
+        "from constants import VALUE\n"
+        "@compiled\n"
+        "def taken():\n"
+        + ("    return VALUE[0]\n" if "(1" in first else "    return np.zeros(3, VALUE).nbytes\n")
+    )
+
+    def answer(value: str) -> tuple[str, ...]:
+        (tmp_path / "constants.py").write_text(f"import numpy as np\nVALUE = {value}\n")
+        code = "from user import taken\nprint(taken(), sum(taken.stats.cache_hits.values()))"
+        return printed(code, tmp_path)
+
+    before = answer(first)
+    assert answer(first) == (before[0], "1")
+    after = answer(second)
+    assert after[1] == "0" and after[0] != before[0]
+
+
 def test_a_bound_function_that_was_typed_in_needs_no_file(tmp_path: Path) -> None:
     (tmp_path / "templates.py").write_text("def template(x):\n    return step(x) + 1\n")
     code = (
