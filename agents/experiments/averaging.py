@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from agents.evaluation import bootstrap_interval
 from agents.experiments.design import Experiment
-from agents.experiments.markdown import in_brackets, markdown_table
-from agents.experiments.statistics import by_seed, mean, score
+from agents.experiments.statistics import by_seed, score
 from agents.experiments.training import RUN, class_counts, learners, pattern_seeds, training
 
 if TYPE_CHECKING:
@@ -50,11 +50,8 @@ def averaging(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 
 def table(results: xr.Dataset) -> str:
     """Mean with its 95 % interval, and the difference to a constant rate, as Markdown."""
-    head = (
-        "rule", "end of training", "classes", "mean (95 % interval)",
-        "less that at a constant rate", "ahead of it",
-    )  # fmt: skip
-    rows = []
+    lines = ["| rule | end of training | classes | mean (95 % interval) | less that at a constant "
+             "rate | ahead of it |", "|---|---|---|---|---|---|"]  # fmt: skip
     scores = score(results)
     for rule in RULES:
         for classes in scores["classes"].values:
@@ -64,7 +61,10 @@ def table(results: xr.Dataset) -> str:
                 difference = row - here["constant"]
                 cells = ["", ""]
                 if ending != "constant":
-                    ahead = f"{np.sum(difference > 0)} of {len(row)}"
-                    cells = [in_brackets(mean(difference), "+,.0f"), ahead]
-                rows.append((rule, ending, classes, in_brackets(mean(row), ",.0f"), *cells))
-    return "\n".join(markdown_table(head, rows))
+                    low, high = bootstrap_interval(difference)
+                    cells = [f"{difference.mean():+,.0f} ({low:+,.0f} … {high:+,.0f})",
+                             f"{np.sum(difference > 0)} of {len(row)}"]  # fmt: skip
+                low, high = bootstrap_interval(row)
+                lines.append(f"| {rule} | {ending} | {classes} | {row.mean():,.0f} ({low:,.0f} … "
+                             f"{high:,.0f}) | {' | '.join(cells)} |")  # fmt: skip
+    return "\n".join(lines)

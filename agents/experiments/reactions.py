@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents import bootstrap_interval
 from agents.chemistry import Course, ReactionNetwork, Reactor
 from agents.chemistry.mistakes import Mistakes, count_mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN
@@ -16,7 +17,7 @@ from agents.continuous.outputs import in_occurrences, outputs_alone
 from agents.experiments.continuous_time import CLASSES, first_stored, threshold_line
 from agents.experiments.design import Block, Coordinate, Experiment, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, by_seed, mean, means, ratio_of_means
+from agents.experiments.statistics import Interval, by_seed, mean, ratio_of_means
 from agents.experiments.training import (
     WEIGHTS,
     class_counts,
@@ -275,12 +276,13 @@ def _print_amounts(axis: Axes, trial: Trial, course: Course) -> None:
 
 def draw_mistakes(mistakes: Mistakes) -> Figure:
     """Wrong outputs per trial against molecules per input spike, with 95 % intervals."""
-    found = means(mistakes.stochastic.T)
+    average = mistakes.stochastic.mean(axis=1)
+    interval = np.array([bootstrap_interval(row) for row in mistakes.stochastic])
     with styled():
         figure, grid = panels(1, 1, width=1.3 * NARROW, height=0.85 * NARROW)
         axis: Axes = grid[0, 0]
         axis.errorbar(
-            mistakes.molecules, found[:, 0], np.abs(found[:, 1:].T - found[:, 0]), color=BLUE,
+            mistakes.molecules, average, yerr=np.abs(interval.T - average), color=BLUE,
             marker="o", markersize=4, linewidth=1.0, capsize=2.5,
             label="molecule by molecule (mean, 95 % interval)",
         )  # fmt: skip
@@ -294,7 +296,7 @@ def draw_mistakes(mistakes: Mistakes) -> Figure:
         axis.set_xticks(mistakes.molecules, [f"{number:,}" for number in mistakes.molecules])
         axis.minorticks_off()
         # A little below 0, so that lines at 0 do not hide in the frame.
-        axis.set_ylim(bottom=-0.03 * max(float(found.max()), 1.0))
+        axis.set_ylim(bottom=-0.03 * max(float(interval.max()), 1.0))
         axis.set(xlabel="molecules per input spike", ylabel="wrong outputs per trial")
         axis.legend()
     return figure

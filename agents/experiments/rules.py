@@ -13,8 +13,7 @@ import numpy as np
 
 from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.markdown import in_brackets, markdown_table
-from agents.experiments.statistics import by_seed, interquartile_mean, mean, score
+from agents.experiments.statistics import by_seed, interquartile_mean, score
 from agents.experiments.training import class_counts, learners, pattern_seeds, training
 from agents.experiments.verdict import Results
 from agents.plotting import WIDE, panels
@@ -68,21 +67,28 @@ def rules(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 
 def table(results: xr.Dataset) -> str:
     """Mean, 95 % interval, median and interquartile mean, and wins over ALL, as Markdown."""
-    head = ("learner", "classes", "mean (95 % interval)", "median", "IQM", "ahead of ALL")
-    rows = []
+    from agents import bootstrap_interval
+
+    lines = ["| learner | classes | mean (95 % interval) | median | IQM | ahead of ALL |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
     scores = score(results)
     for name in LEARNERS:
         for classes in scores["classes"].values:
             row = by_seed(scores.sel(classes=classes, learner=name))
             other = by_seed(scores.sel(classes=classes, learner="A: GNM, ALL, paper"))
+            low, high = bootstrap_interval(row)
             ahead = "" if name.endswith("paper") else f"{np.sum(row > other)} of {len(row)}"
-            middle = f"{np.median(row):,.0f}", f"{interquartile_mean(row):,.0f}"
-            rows.append((name, classes, in_brackets(mean(row), ",.0f"), *middle, ahead))
-    return "\n".join(markdown_table(head, rows))
+            lines.append(
+                f"| {name} | {classes} | {row.mean():,.0f} ({low:,.0f} … {high:,.0f}) | "
+                f"{np.median(row):,.0f} | {interquartile_mean(row):,.0f} | {ahead} |"
+            )
+    return "\n".join(lines)
 
 
 def draw(results: Results) -> Figure:
     """Each pattern seed a point, by feedback and rule; a column for each number of classes."""
+    from agents import bootstrap_interval
+
     scores = score(results["RULES"])
     counts = scores["classes"].values
     figure, axes = panels(1, len(counts), width=WIDE, height=0.28 * len(LEARNERS) + 0.9)
@@ -94,9 +100,9 @@ def draw(results: Results) -> Figure:
             colour = colours[name.partition(":")[0]]
             jitter = place + rng.uniform(-0.18, 0.18, len(row))
             axis.plot(row, jitter, ".", color=colour, markersize=2.5, alpha=0.45)
-            value, *ends = mean(row)
-            axis.plot(ends, [place, place], color="0.1", linewidth=1.2)
-            axis.plot(value, place, "o", color="0.1", markersize=3.5)
+            low, high = bootstrap_interval(row)
+            axis.plot([low, high], [place, place], color="0.1", linewidth=1.2)
+            axis.plot(row.mean(), place, "o", color="0.1", markersize=3.5)
         axis.set(
             xlim=(0, 10_200), ylim=(len(LEARNERS) - 0.5, -0.5), title=f"{classes} classes",
             xlabel="bins survived", yticks=range(len(LEARNERS)), yticklabels=[],
