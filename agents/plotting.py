@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from agents.history import History
 from agents.recording import record
@@ -101,6 +102,26 @@ def silent_line(axes: Axes, score: float) -> None:
         f"silent\n{score:.0f}", (1.005, score), xycoords=("axes fraction", "data"),
         ha="left", va="center", fontsize=6, color=GREY, annotation_clip=False,
     )  # fmt: skip
+
+
+def error_bars(axes: Axes, x: ArrayLike, found: ArrayLike, **look: Any) -> None:
+    """Values with their intervals as bars; `found` has value, low and high of one or of many."""
+    values, low, high = np.atleast_2d(found).T
+    # An interval of a quantile may leave the value outside by less than a rounding.
+    axes.errorbar(x, values, np.maximum([values - low, high - values], 0.0), **look)
+
+
+def band(
+    axes: Axes, x: ArrayLike, found: NDArray[Any], *look: str, dense: float = 0.2, **how: Any
+) -> None:
+    """A line of values within the band of their intervals; `found` is (values, 3)."""
+    axes.fill_between(x, found[:, 1], found[:, 2], color=how["color"], alpha=dense, lw=0)
+    axes.plot(x, found[:, 0], *look, **how)
+
+
+def legend_above(figure: Figure, axes: Axes, columns: int) -> None:
+    """What the lines of one panel are, above all panels."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=columns)
 
 
 def class_colour(class_: int) -> str:

@@ -86,11 +86,16 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
+def without_none(hint: Any) -> tuple[Any, bool]:
+    """A type of which None is no longer one, and whether it was."""
+    kinds = [kind for kind in typing.get_args(hint) if kind is not types.NoneType]
+    optional = len(kinds) < len(typing.get_args(hint))
+    return (kinds[0] if optional and len(kinds) == 1 else hint), optional
+
+
 def _parsing(hint: Any) -> dict[str, Any] | None:
     """How argparse reads a value of this type; None if it cannot."""
-    kinds = [kind for kind in typing.get_args(hint) if kind is not types.NoneType]
-    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
-        hint = kinds[0] if len(kinds) == 1 else hint
+    hint, _ = without_none(hint)
     if typing.get_origin(hint) is tuple:
         return {"type": typing.get_args(hint)[0], "nargs": "+", "metavar": "N"}
     if hint is bool:

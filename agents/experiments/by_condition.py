@@ -27,7 +27,7 @@ from agents.experiments.forensics import (
     conditions,
 )
 from agents.experiments.forest import draw_forest
-from agents.experiments.statistics import Interval, bootstrap, mean, wins
+from agents.experiments.statistics import Interval, mean, ratio_of_means, wins
 from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import WIDE, letter, panels
 
@@ -63,9 +63,7 @@ def _everywhere(results: Results, judge: Judge, forest: Forest) -> Finding:
             held[f"the condition is {label}"] = holds
             words.append(f"{label}: {told}")
             marks.append(Mark(label, value, holds))
-    return Finding(
-        all(held.values()), held, tuple(words), forest=forest._replace(marks=tuple(marks))
-    )
+    return Finding.of(held, words, forest=forest._replace(marks=tuple(marks)))
 
 
 def _column(scores: Array, name: str) -> Array:
@@ -74,11 +72,7 @@ def _column(scores: Array, name: str) -> Array:
 
 
 def _ratio(scores: Array, above: str, below: str) -> Interval:
-    return bootstrap(
-        lambda a, b: float(a.mean() / max(b.mean(), 1.0)),
-        _column(scores, above),
-        _column(scores, below),
-    )
+    return ratio_of_means(_column(scores, above), _column(scores, below), least=1.0)
 
 
 def _mst(scores: Array) -> tuple[Interval, bool, str]:

@@ -20,7 +20,7 @@ Learning rates were chosen on pattern seeds 200 and 201; what is reported is hea
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from agents import GNM, MST, answers, noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, rate
+from agents.experiments.statistics import Interval, bootstrap, by_seed, rate
 from agents.experiments.training import learners, make_agent, pattern_seeds, protocol
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BLUE, GREY, INK, RED, WIDE, letter, panels
+from agents.plotting import BLUE, GREY, INK, RED, WIDE, error_bars, legend_above, letter, panels
 from gnm_env import Patterns, Task, Trials
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ def capacity(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """Every learner at every load, with the inputs, the length and the rate varied in turn."""
     usual, names, heard = _SIZES[size]
     axes = (
-        Axis("situation", names, 1, tuple(SITUATIONS[name] for name in names),
-             long_name="what differs from N = 100, M = 50, p = 0.005"),
+        Axis.named("situation", {name: SITUATIONS[name] for name in names},
+                   long_name="what differs from N = 100, M = 50, p = 0.005"),
         Axis("load", LOADS, long_name="patterns per input"),
         pattern_seeds(seeds or usual),
         learners(LEARNERS),
@@ -155,7 +155,7 @@ def _compute(block: Block) -> dict[str, NDArray[Any]]:
     survived = noisy_performance(
         agents, task, patterns, shared["runs"], shared["cap"], EVALUATION + 1_000 * seed, threads=1
     )
-    return {"survived": survived.reshape(*block.shape, -1)}
+    return block.shaped(survived=survived)
 
 
 TRAINING, EVALUATION = 600_000_000, 700_000_000
@@ -227,20 +227,14 @@ def _compute_load(block: Block) -> dict[str, NDArray[Any]]:
     trials = latency_patterns(inputs, shared["bins"], round(shared["load"] * inputs), seed)
     heard = shared["cycles"] * len(trials)
     relative = LATENCY["n_inputs"] / inputs
+    scaled = ({name: one[name] * relative for name in ("learning_rate", "initial_weight")}
+              for one in block.settings)  # fmt: skip
     agents = [
-        make_agent(
-            {
-                **one,
-                "learning_rate": one["learning_rate"] * relative,
-                "initial_weight": one["initial_weight"] * relative,
-                "decay_trials": heard,
-            },
-            trials,
-        )
-        for one in block.settings
+        make_agent({**one, **numbers, "decay_trials": heard}, trials)
+        for one, numbers in zip(block.settings, scaled, strict=True)
     ]
     train_many(agents, trials, trials=heard, seed=TRAINING + seed, threads=1)
-    return {"right": share_right(agents, trials).reshape(block.shape)}
+    return block.shaped(right=share_right(agents, trials))
 
 
 def share_right(agents: list[Any], trials: Trials) -> NDArray[np.float64]:
@@ -257,8 +251,7 @@ def mistakes(data: xr.Dataset, situation: str, learner: str) -> NDArray[np.float
 
     A presentation comes with the noise before it, (1 − q)/q bins on average.
     """
-    cell = data["survived"].sel(situation=situation, learner=learner)
-    survived = cell.transpose("pattern_seed", "load", "run").to_numpy()
+    survived = by_seed(data["survived"].sel(situation=situation, learner=learner), "load", "run")
     made = (survived < data.attrs["settings"]["common"]["cap"]).sum(-1)
     each = usual_task(situation).silent_score + 1.0
     return np.asarray(rate(made, survived.sum(-1)) * each / 1_000.0)
@@ -294,13 +287,23 @@ def held(data: xr.Dataset, situation: str, learner: str) -> Held:
     return Held(value, value.value in (loads[0], loads[-1]))
 
 
+def in_patterns(found: Held, situation: str) -> Interval:
+    """A capacity in patterns."""
+    inputs = usual_task(situation).n_inputs
+    return Interval(*(inputs * end for end in found.value))
+
+
+def _stored(data: xr.Dataset, situations: Iterable[str]) -> list[str]:
+    return [name for name in situations if name in data["situation"].to_numpy()]
+
+
 def growth(data: xr.Dataset, learner: str) -> Interval:
     """Exponent with which the patterns held grow with the inputs: 1 where twice hold twice.
 
     The slope of log capacity over log N, over the numbers of inputs of the store.
     """
     loads = data["load"].to_numpy()
-    names = [one for one in FAMILIES["inputs N"] if one in data["situation"].to_numpy()]
+    names = _stored(data, FAMILIES["inputs N"])
     inputs = np.log([usual_task(name).n_inputs for name in names])
     rates = np.stack([mistakes(data, name, learner) for name in names], axis=1)
 
@@ -324,7 +327,7 @@ def ratio(data: xr.Dataset, more: str, less: str, learner: str) -> Interval:
 def load_at(data: xr.Dataset, learner: str) -> Interval:
     """Load at which the mean share of right answers falls through `RIGHT`; an end if beyond."""
     loads = data["load"].to_numpy()
-    share = data["right"].sel(learner=learner).transpose("pattern_seed", "load").to_numpy()
+    share = by_seed(data["right"].sel(learner=learner), "load")
 
     def where(sample: NDArray[np.float64]) -> float:
         level = sample.mean(0)
@@ -347,33 +350,22 @@ def _by_rule(rule: str) -> list[str]:
 def _told(data: xr.Dataset, learner: str) -> str:
     """The capacities of a learner by number of inputs, in patterns."""
     parts = []
-    for name in FAMILIES["inputs N"]:
-        if name in data["situation"].to_numpy():
-            inputs = usual_task(name).n_inputs
-            found, beyond = held(data, name, learner)
-            patterns = Interval(*(inputs * end for end in found))
-            parts.append(f"{name} {patterns:.1f}" + (" (an end of the loads)" if beyond else ""))
+    for name in _stored(data, FAMILIES["inputs N"]):
+        found = held(data, name, learner)
+        beyond = " (an end of the loads)" if found.beyond else ""
+        parts.append(f"{name} {in_patterns(found, name):.1f}{beyond}")
     return f"{learner}: " + ", ".join(parts)
 
 
-def _judge_proportion(results: Results) -> Finding:
+def _judge_growth(results: Results, rule: str, expected: Callable[[Interval], bool]) -> Finding:
+    """Whether the exponent of each learner of a rule is as expected."""
     data = results["CAPACITY"]
     kept, words = {}, []
-    for learner in _by_rule("PeakError"):
+    for learner in _by_rule(rule):
         found = growth(data, learner)
-        kept[f"it is {learner}"] = found.above(0.8) and found.below(1.2)
+        kept[learner] = expected(found)
         words += [f"{learner}: exponent {found:.2f}", "patterns, " + _told(data, learner)]
-    return Finding(all(kept.values()), kept, tuple(words))
-
-
-def _judge_blind(results: Results) -> Finding:
-    data = results["CAPACITY"]
-    kept, words = {}, []
-    for learner in _by_rule("CriticalThreshold"):
-        found = growth(data, learner)
-        kept[f"it is {learner}"] = found.below(0.8)
-        words += [f"{learner}: exponent {found:.2f}", "patterns, " + _told(data, learner)]
-    return Finding(all(kept.values()), kept, tuple(words))
+    return Finding.of(kept, words, "it is {}")
 
 
 def _judge_length(results: Results) -> Finding:
@@ -382,9 +374,9 @@ def _judge_length(results: Results) -> Finding:
     for learner in _by_rule("PeakError"):
         longer = ratio(data, "M 100", "M 25", learner)
         faster = ratio(data, "p 0.01", "p 0.0025", learner)
-        kept[f"it is {learner}"] = longer.above(1.5) and faster.below(1.5)
+        kept[learner] = longer.above(1.5) and faster.below(1.5)
         words.append(f"{learner}: four times the length {longer:.1f}, of the rate {faster:.1f}")
-    return Finding(all(kept.values()), kept, tuple(words))
+    return Finding.of(kept, words, "it is {}")
 
 
 def _judge_anchor(results: Results) -> Finding:
@@ -416,7 +408,9 @@ HYPOTHESES = (
         "holds if the exponent with which the capacity grows with the number of inputs, 50 to "
         "1,000, has an interval within 0.8 … 1.2 for GNM and MST",
         ("CAPACITY",),
-        _judge_proportion,
+        lambda results: _judge_growth(
+            results, "PeakError", lambda exponent: exponent.above(0.8) and exponent.below(1.2)
+        ),
     ),
     Hypothesis(
         "K2",
@@ -427,7 +421,9 @@ HYPOTHESES = (
         _PROTOCOL + "; CriticalThreshold",
         "holds if the same exponent has an interval below 0.8 for GNM and MST",
         ("CAPACITY",),
-        _judge_blind,
+        lambda results: _judge_growth(
+            results, "CriticalThreshold", lambda exponent: exponent.below(0.8)
+        ),
     ),
     Hypothesis(
         "K3",
@@ -478,18 +474,13 @@ def _draw(results: Results) -> Figure:
         letter(axes, name)
     _draw_growth(grid[0, 2], data)
     _draw_anchor(grid[1, 2], results["LOAD"])
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7
-    )
+    legend_above(figure, grid[0, 0], 4)
     return figure
 
 
 def _line(axes: Axes, x: Any, found: list[Interval], look: dict[str, Any], label: str) -> None:
     """Values with their intervals as bars."""
-    values = np.array(found)
-    # An interval of a quantile may leave the value outside by less than a rounding.
-    bars = np.maximum([values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]], 0.0)
-    axes.errorbar(x, values[:, 0], bars, ms=4, lw=1.1, elinewidth=0.9, label=label, **look)
+    error_bars(axes, x, found, ms=4, lw=1.1, elinewidth=0.9, label=label, **look)
 
 
 def _draw_mistakes(axes: Axes, data: xr.Dataset) -> None:
@@ -507,7 +498,7 @@ def _draw_mistakes(axes: Axes, data: xr.Dataset) -> None:
 
 def _draw_capacity(axes: Axes, data: xr.Dataset, situations: tuple[str, ...]) -> None:
     """Capacity in patterns per input against what is varied."""
-    here = [name for name in situations if name in data["situation"].to_numpy()]
+    here = _stored(data, situations)
     field = next(iter(SITUATIONS[situations[0]]))
     at = [float(getattr(usual_task(name), field)) for name in here]
     for learner, look in _LOOKS.items():
@@ -523,13 +514,10 @@ def _draw_capacity(axes: Axes, data: xr.Dataset, situations: tuple[str, ...]) ->
 
 def _draw_growth(axes: Axes, data: xr.Dataset) -> None:
     """Capacity in patterns against inputs, with the line of proportion."""
-    here = [name for name in FAMILIES["inputs N"] if name in data["situation"].to_numpy()]
+    here = _stored(data, FAMILIES["inputs N"])
     at = np.array([float(usual_task(name).n_inputs) for name in here])
     for learner, look in _LOOKS.items():
-        found = [
-            Interval(*(inputs * end for end in held(data, name, learner).value))
-            for inputs, name in zip(at, here, strict=True)
-        ]
+        found = [in_patterns(held(data, name, learner), name) for name in here]
         _line(axes, at, found, look, learner)
     axes.plot(at, at / 6, color=GREY, lw=0.8, ls=":")
     axes.set(xscale="log", yscale="log", xlabel="inputs N", ylabel="patterns")
@@ -548,7 +536,7 @@ def _draw_anchor(axes: Axes, data: xr.Dataset) -> None:
     loads = data["load"].to_numpy()
     looks = {"MST, Tempotron": (BLUE, "v", "white"), "GNM, Tempotron": (BLUE, "o", BLUE)}
     for learner, (colour, mark, fill) in looks.items():
-        share = data["right"].sel(learner=learner).transpose("load", "pattern_seed").to_numpy()
+        share = by_seed(data["right"].sel(learner=learner), "load").T
         found = [bootstrap(np.mean, 100.0 * row) for row in share]
         _line(axes, loads, found, {"color": colour, "marker": mark, "mfc": fill}, learner)
     axes.axhline(100 * RIGHT, color=GREY, lw=0.8, ls=":")

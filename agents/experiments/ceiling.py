@@ -11,16 +11,17 @@ Needs the library cma (`pip install "gnm-env[search]"`) to compute, not to judge
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import noisy_performance, train_many
+from agents import noisy_performance
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import bootstrap, mean
+from agents.experiments.statistics import by_seed, counts_of, mean, ratio_of_means
 from agents.experiments.training import (
     RUN,
     class_counts,
@@ -30,10 +31,10 @@ from agents.experiments.training import (
     protocol,
     stream_seeds,
     task_of,
-    training_seed,
+    trained,
 )
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BINS, BLUE, INK, RED, WIDE, letter, panels
+from agents.plotting import BINS, BLUE, INK, RED, WIDE, legend_above, letter, panels
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
@@ -63,12 +64,7 @@ PEAK_ERROR: dict[tuple[str, str], dict[str, Any]] = {
 """As they did well on pattern seeds 0 to 15."""
 
 METHODS = ("ALL", "PeakError", "search from ALL", "search from PeakError")
-SEARCH = {
-    "candidates": 32,
-    "streams": 30,
-    "search_cap": 2_000,
-    "steps": (0.05, 0.01),
-}
+SEARCH = {"candidates": 32, "streams": 30, "search_cap": 2_000, "steps": (0.05, 0.01)}
 """`steps`: the first step sizes, from the weights of ALL and from those of PeakError."""
 
 GENERATIONS = {"quick": (20, 5), "paper": (150, 30)}
@@ -82,12 +78,12 @@ SEARCH_SEED = 500_000_000
 def ceiling(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """Learned and sought weights, by neuron, bounds and number of classes."""
     usual, classes = SIZES[size]
-    bounds = tuple({**setting, "bounds": name} for name, setting in BOUNDS.items())
+    bounds = {name: {**setting, "bounds": name} for name, setting in BOUNDS.items()}
     axes = (
         class_counts(*classes),
         pattern_seeds(seeds or usual),
-        Axis("model", tuple(NEURONS), 1, tuple(NEURONS.values()), long_name="neuron"),
-        Axis("weights_in", tuple(BOUNDS), 1, bounds, long_name="weight bounds"),
+        Axis.named("model", NEURONS, long_name="neuron"),
+        Axis.named("weights_in", bounds, long_name="weight bounds"),
     )
     common = {**RUN, **SEARCH, "generations": GENERATIONS[size]}
     task = Task()
@@ -123,8 +119,7 @@ def _compute(block: Block) -> dict[str, NDArray[Any]]:
     chosen = evaluator(setting, len(weights))(
         weights, setting["runs"], setting["cap"], seed + 500
     ).mean(axis=1)
-    values = {"survived": survived, "chosen": chosen, "weights": weights}
-    return {name: value.reshape(*block.shape, *value.shape) for name, value in values.items()}
+    return block.shaped(survived=[survived], chosen=[chosen], weights=[weights])
 
 
 def _peak_error(setting: Setting) -> dict[str, Any]:
@@ -133,10 +128,8 @@ def _peak_error(setting: Setting) -> dict[str, Any]:
 
 def _learned(setting: Setting, rule: dict[str, Any]) -> NDArray[np.float64]:
     task = task_of(setting)
-    seed = setting["pattern_seed"]
-    agent = make_agent({**setting, **rule}, task)
-    stream = training_seed(setting["classes"], seed)
-    train_many([agent], task, Patterns.draw(task, seed), setting["trials"], stream, threads=1)
+    patterns = Patterns.draw(task, setting["pattern_seed"])
+    (agent,), _ = trained([{**setting, **rule}], task, patterns)
     return np.array(agent.weights)
 
 
@@ -209,14 +202,9 @@ def scores(data: xr.Dataset, classes: int, neuron: str, bounds: str) -> NDArray[
     The best of the four are chosen on other streams than they are scored on.
     """
     cell = data.sel(classes=classes, model=neuron, weights_in=bounds)
-    rows = cell["survived"].mean("run").transpose("pattern_seed", "method").to_numpy()
-    best = cell["chosen"].transpose("pattern_seed", "method").to_numpy().argmax(axis=1)
+    rows = by_seed(cell["survived"].mean("run"), "method")
+    best = by_seed(cell["chosen"], "method").argmax(axis=1)
     return np.column_stack([rows, rows[np.arange(len(rows)), best]])
-
-
-def _cells(data: xr.Dataset) -> list[tuple[int, str, str]]:
-    counts = [int(c) for c in data["classes"].to_numpy()]
-    return [(c, neuron, bounds) for c in counts for neuron in NEURONS for bounds in BOUNDS]
 
 
 # --- the hypotheses ------------------------------------------------------------------------------
@@ -225,53 +213,41 @@ TIMES = {2: 1.5, 4: 10.0}
 REACHED = 0.8
 
 
-def _ratio(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    return float(first.mean() / second.mean())
-
-
 def _judge_height(results: Results) -> Finding:
     data = results["CEILING"]
     held, words = {}, []
-    for classes in (int(c) for c in data["classes"].to_numpy()):
+    for classes in counts_of(data):
         rows = scores(data, classes, "GNM", "signed")
-        times = bootstrap(_ratio, rows[:, -1], rows[:, 0])
+        times = ratio_of_means(rows[:, -1], rows[:, 0])
         held[classes] = times.above(TIMES[classes])
         words.append(
             f"{classes} classes: best known weights {mean(rows[:, -1]):,.0f} bins, ALL in the same "
             f"bounds {mean(rows[:, 0]):,.0f}: {times:.1f} times"
         )
-    conditions = {f"the task has {c} classes": holds for c, holds in held.items()}
-    return Finding(all(held.values()), conditions, tuple(words))
+    return Finding.of(held, words, "the task has {} classes")
 
 
 def _judge_rule(results: Results) -> Finding:
     data = results["CEILING"]
-    held, words = {}, []
-    for cell in _cells(data):
-        rows = scores(data, *cell)
-        share = bootstrap(_ratio, rows[:, 1], rows[:, -1])
-        name = f"{cell[0]} classes, {cell[1]}, {cell[2]}"
-        held[name] = share.above(REACHED)
-        words.append(f"{name}: {share:.0%}")
-    conditions = {
-        f"the task has {c} classes": all(h for name, h in held.items() if name.startswith(f"{c} "))
-        for c in data["classes"].to_numpy()
-    }
-    return Finding(
-        all(held.values()), conditions, ("PeakError over best known: " + "; ".join(words),)
-    )
+    held, words = dict.fromkeys(counts_of(data), True), []
+    for classes, neuron, bounds in itertools.product(held, NEURONS, BOUNDS):
+        rows = scores(data, classes, neuron, bounds)
+        share = ratio_of_means(rows[:, 1], rows[:, -1])
+        held[classes] &= share.above(REACHED)
+        words.append(f"{classes} classes, {neuron}, {bounds}: {share:.0%}")
+    told = "PeakError over best known: " + "; ".join(words)
+    return Finding.of(held, (told,), "the task has {} classes")
 
 
 def _judge_neuron(results: Results) -> Finding:
     data = results["CEILING"]
     held, words = {}, []
-    for classes in (int(c) for c in data["classes"].to_numpy()):
+    for classes in counts_of(data):
         gnm, mst = (scores(data, classes, name, "signed")[:, -1] for name in ("GNM", "MST"))
         gain = mean(gnm - mst)
         held[classes] = gain.above(0.0)
         words.append(f"{classes} classes: GNM − MST {gain:+,.0f} bins")
-    conditions = {f"the task has {c} classes": holds for c, holds in held.items()}
-    return Finding(all(held.values()), conditions, tuple(words))
+    return Finding.of(held, words, "the task has {} classes")
 
 
 _PROTOCOL = (
@@ -332,9 +308,9 @@ _LOOKS = {
 def _draw(results: Results) -> Figure:
     """Scores of learned and of sought weights, by neuron and bounds, one panel per class count."""
     data = results["CEILING"]
-    counts = [int(c) for c in data["classes"].to_numpy()]
+    counts = counts_of(data)
     figure, grid = panels(1, len(counts), width=WIDE, height=3.2, sharey=True)
-    places = [(neuron, bounds) for neuron in NEURONS for bounds in BOUNDS]
+    places = list(itertools.product(NEURONS, BOUNDS))
     for axes, classes, name in zip(grid[0], counts, "ab", strict=False):
         for place, (neuron, bounds) in enumerate(places):
             rows = scores(data, classes, neuron, bounds)
@@ -351,9 +327,7 @@ def _draw(results: Results) -> Figure:
         axes.set_xticks(range(len(places)), [f"{n}\n{b}" for n, b in places], fontsize=7)
         letter(axes, f"{name}   {classes} classes")
     grid[0, 0].set_ylabel(BINS)
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7
-    )
+    legend_above(figure, grid[0, 0], 4)
     return figure
 
 

@@ -41,7 +41,7 @@ def two_levels(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """V, D and R over time for both levels of input; the same at every size."""
     if seeds:
         raise ValueError("F1 has no pattern seeds: leave --seeds out")
-    levels = Axis("input", tuple(LEVELS), settings=tuple({"drive": v} for v in LEVELS.values()))
+    levels = Axis.named("input", {name: {"drive": level} for name, level in LEVELS.items()})
     variables = tuple(
         Variable(name, dtype, units, what, ("bin",))
         for name, (dtype, units, what) in TRACES.items()

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from agents import AggregateLabel, train_many
+from agents import AggregateLabel
 from agents.continuous import ContinuousAgent, ContinuousGNM, Trajectory
 from agents.continuous.outputs import course, outputs_alone, pattern_spikes
 from agents.experiments.design import Block, Experiment, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, median
+from agents.experiments.statistics import Interval, by_seed, median
 from agents.experiments.training import (
     WEIGHTS,
     class_counts,
     pattern_seeds,
     protocol,
     stream_seeds,
-    training_seed,
+    trained,
 )
 from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import BLUE, GREY, INK, WIDE, panels, styled
@@ -54,32 +54,11 @@ def two_classes(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     )
 
 
-def trained(
-    setting: dict[str, Any], neuron: ContinuousGNM
-) -> tuple[ContinuousAgent, Task, Patterns]:
-    """`neuron` at the end of the training that a setting describes."""
-    classes, pattern_seed = setting["classes"], setting["pattern_seed"]
-    task = Task(n_classes=classes)
-    patterns = Patterns.draw(task, pattern_seed)
-    agent = untrained(neuron, pattern_seed)
-    seed = training_seed(classes, pattern_seed)
-    train_many([agent], task, patterns, setting["trials"], seed, threads=1)
-    return agent, task, patterns
-
-
-def untrained(neuron: ContinuousGNM, pattern_seed: int) -> ContinuousAgent:
-    """The neuron as it begins."""
-    return ContinuousAgent(neuron, AggregateLabel(), Task().n_inputs, seed=pattern_seed)
-
-
 def _train(block: Block) -> dict[str, NDArray[Any]]:
-    (setting,) = block.settings
-    agent, _, patterns = trained(setting, ContinuousGNM(alpha=setting["alpha"]))
-    amounts = outputs_alone(agent, patterns)
-    return {
-        "S": amounts.reshape(*block.shape, -1),
-        "weights": agent.weights.reshape(*block.shape, -1),
-    }
+    task = Task(n_classes=CLASSES)
+    patterns = Patterns.draw(task, block.settings[0]["pattern_seed"])
+    (agent,), _ = trained(block.settings, task, patterns)
+    return block.shaped(S=[outputs_alone(agent, patterns)], weights=[agent.weights])
 
 
 # --- the claim -----------------------------------------------------------------------------------
@@ -90,7 +69,7 @@ TOLERANCE = 0.2
 
 
 def _judge(results: Results) -> Finding:
-    S = results["F2"]["S"].squeeze("classes").transpose("pattern_seed", "target").to_numpy()
+    S = by_seed(results["F2"]["S"].squeeze("classes"), "target")
     medians = [median(S[:, k]) for k in range(CLASSES)]
     held = [abs(found.value - (k + 1)) <= TOLERANCE for k, found in enumerate(medians)]
     numbers = tuple(
@@ -134,7 +113,7 @@ def first_stored(results: xr.Dataset) -> tuple[xr.Dataset, Task, Patterns]:
 def _draw_first(results: Results) -> Figure:
     data, task, patterns = first_stored(results["F2"])
     neuron = ContinuousGNM(alpha=data.attrs["settings"]["common"]["alpha"])
-    agent = untrained(neuron, int(data["pattern_seed"]))
+    agent = ContinuousAgent(neuron, AggregateLabel(), task.n_inputs)
     agent.weights = data["weights"].to_numpy()
     return draw(agent, task, patterns)
 

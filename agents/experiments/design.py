@@ -68,6 +68,13 @@ class Axis:
                 f"{len(self.settings)} for {len(self.values)} values"
             )
 
+    @classmethod
+    def named(
+        cls, name: str, rows: Mapping[Any, Mapping[str, Any]], chunk: int = 1, long_name: str = ""
+    ) -> Axis:
+        """An axis of named settings."""
+        return cls(name, tuple(rows), chunk, tuple(rows.values()), long_name=long_name)
+
     @property
     def step(self) -> int:
         """Values per block along this axis."""
@@ -127,6 +134,10 @@ class Block:
     def region(self) -> tuple[slice, ...]:
         """The block as an index into an array of results."""
         return tuple(slice(first, last) for first, last in self.ranges)
+
+    def shaped(self, **values: Any) -> dict[str, NDArray[Any]]:
+        """Arrays of results whose first axis is the cells, as `Experiment.compute` gives them."""
+        return {name: np.reshape(v, (*self.shape, *np.shape(v)[1:])) for name, v in values.items()}
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,29 @@ from agents.experiments.figures import Picture
 from agents.experiments.heat_maps import CLASS_NAMES
 from agents.experiments.methods import GNM_ALL, LIF_ALL, MST_ALL, initial_weights
 from agents.experiments.residuals import AHEAD_SIGMAS, ASKED, clearly_ahead
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score, share
+from agents.experiments.statistics import (
+    Interval,
+    bootstrap,
+    by_seed,
+    counts_of,
+    mean,
+    means,
+    ratio_of_means,
+    score,
+    share,
+)
 from agents.experiments.training import (
     STARTS,
     WIDE_START,
+    alpha_axis,
     class_counts,
+    eta_axis,
     learners,
     pattern_seeds,
     training,
 )
 from agents.experiments.verdict import Claim, Finding, Results
-from agents.plotting import BLUE, INK, RED, WIDE, letter, panels, silent_line
+from agents.plotting import BLUE, INK, RED, WIDE, error_bars, letter, panels, silent_line
 from gnm_env import Task
 
 if TYPE_CHECKING:
@@ -94,7 +106,7 @@ def both_times(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (
         class_counts(1, 2),
         pattern_seeds(seeds or SEEDS[size][:16]),
-        Axis("alpha", ALPHAS[size], chunk=0, units="1/bin", long_name="α, decay per bin"),
+        alpha_axis(ALPHAS[size]),
         learners(TIMES),
     )
     return training("TIMES", "Discrete and continuous time over α", axes)
@@ -106,14 +118,13 @@ READOUTS: dict[str, dict[str, Any]] = {"V": {}, "D": {"weight_bounds": None}}
 
 def spikiness(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """A coarse map over α and η for every number of classes and both readouts."""
-    names = tuple(READOUTS)
-    settings = tuple({"readout": name, **READOUTS[name]} for name in names)
+    readouts = {name: {"readout": name, **further} for name, further in READOUTS.items()}
     axes = (
         class_counts(*COUNTS[size]),
         pattern_seeds(seeds or SEEDS[size][:16]),
-        Axis("readout", names, settings=settings, long_name="variable beside the threshold"),
-        Axis("eta", ETA, chunk=0, long_name="η, model choice"),
-        Axis("alpha", ALPHAS[size], chunk=0, units="1/bin", long_name="α, decay per bin"),
+        Axis.named("readout", readouts, long_name="variable beside the threshold"),
+        eta_axis(ETA),
+        alpha_axis(ALPHAS[size]),
     )
     return training("SPIKINESS", "Whether η > 0 pays, by classes and readout", axes, **GNM_ALL)
 
@@ -132,8 +143,13 @@ def _scores(results: xr.Dataset, classes: int, start: str, learner: str) -> NDAr
     return by_seed(score(results).sel(classes=classes, start=start, learner=learner))
 
 
-def _counts(results: xr.Dataset) -> list[int]:
-    return [int(count) for count in results["classes"].values]
+def _ratio(data: xr.Dataset, classes: int, start: str, above: str, below: str) -> Interval:
+    pair = (_scores(data, classes, start, learner) for learner in (above, below))
+    return ratio_of_means(*pair, least=1.0)
+
+
+def _there(classes: int) -> str:
+    return "there is one class" if classes == 1 else f"there are {classes} classes"
 
 
 def _judge_alpha(results: Results) -> Finding:
@@ -145,40 +161,33 @@ def _judge_alpha(results: Results) -> Finding:
             LEARNED * SILENT
         ) and none.below(LEARNED * SILENT)
         numbers.append(f"{start}: α = 1 {one:,.0f} bins, α = 0 {none:,.0f}; silence {SILENT:,.0f}")
-    return Finding(all(held.values()), held, tuple(numbers))
+    return Finding.of(held, numbers)
 
 
 def _judge_time(results: Results) -> Finding:
     scores = score(results["TIMES"])
     held, numbers = {}, []
-    for classes in _counts(results["TIMES"]):
-        pair = [
-            by_seed(scores.sel(classes=classes, learner=name).transpose("pattern_seed", "alpha"))
-            for name in TIMES
-        ]
+    for classes in counts_of(results["TIMES"]):
+        pair = [by_seed(scores.sel(classes=classes, learner=name), "alpha") for name in TIMES]
         shape = bootstrap(lambda a, b: spearmanr(a.mean(0), b.mean(0)).statistic, *pair)
         tops = [scores["alpha"].values[one.mean(0).argmax()] for one in pair]
         bins = [one.mean(0).max() for one in pair]
-        held[f"there {'is one class' if classes == 1 else f'are {classes} classes'}"] = (
-            shape.value >= SHAPE
-        )
+        held[_there(classes)] = shape.value >= SHAPE
         numbers.append(
             f"{CLASS_NAMES[classes]}: rank correlation {shape:.2f}; best α {tops[0]:g} and "
             f"{tops[1]:g}, there {bins[0]:,.0f} and {bins[1]:,.0f} bins"
         )
-    return Finding(all(held.values()), held, tuple(numbers))
+    return Finding.of(held, numbers)
 
 
 def _judge_momentum(results: Results) -> Finding:
     errors = results["MOMENTUM"]["error_rate"]
     gains: dict[str, list[Interval]] = {"none": [], "none, λ × 1.25": []}
     numbers = []
-    for classes in _counts(results["MOMENTUM"]):
+    for classes in counts_of(results["MOMENTUM"]):
         for name, found in gains.items():
             with_it, without = (
-                by_seed(
-                    errors.sel(classes=classes, learner=learner).transpose("pattern_seed", "trials")
-                ).mean(1)
+                by_seed(errors.sel(classes=classes, learner=learner), "trials").mean(1)
                 for learner in ("momentum 0.2", name)
             )
             found.append(mean(100.0 * (without - with_it)))
@@ -190,7 +199,7 @@ def _judge_momentum(results: Results) -> Finding:
         "compared at the same λ": all(gain.above(0.0) for gain in gains["none"]),
         "compared at the same effective λ": all(g.above(0.0) for g in gains["none, λ × 1.25"]),
     }
-    return Finding(all(held.values()), held, tuple(numbers))
+    return Finding.of(held, numbers)
 
 
 def _judge_spikiness(results: Results) -> Finding:
@@ -198,14 +207,13 @@ def _judge_spikiness(results: Results) -> Finding:
     held, numbers = {}, []
     for readout in READOUTS:
         fine = []
-        for classes in _counts(results["SPIKINESS"]):
+        for classes in counts_of(results["SPIKINESS"]):
             one = scores.sel(classes=classes, readout=readout)
-            table = by_seed(one.transpose("pattern_seed", "eta", "alpha"))
-            gain = _gain_on_other_seeds(table)
+            gain = _gain_on_other_seeds(by_seed(one, "eta", "alpha"))
             fine.append(not gain.above(0.0))
             numbers.append(f"readout {readout}, {CLASS_NAMES[classes]}: {gain:+,.0f} bins")
         held[f"the readout is {readout}"] = all(fine)
-    return Finding(all(held.values()), held, tuple(numbers))
+    return Finding.of(held, numbers)
 
 
 def _gain_on_other_seeds(table: NDArray[Any]) -> Interval:
@@ -222,17 +230,15 @@ def _gain_on_other_seeds(table: NDArray[Any]) -> Interval:
 
 def _judge_supplement(results: Results) -> Finding:
     held, numbers = {}, []
-    for classes in _counts(results["SPIKINESS"]):
+    for classes in counts_of(results["SPIKINESS"]):
         if classes == 3:
             continue  # figure 5b itself
         data = results["SPIKINESS"].sel(classes=classes, readout="V")
         found = by_seed(clearly_ahead(data))
         ahead = share(found)
-        held[f"there {'is one class' if classes == 1 else f'are {classes} classes'}"] = ahead.below(
-            ASKED
-        )
+        held[_there(classes)] = ahead.below(ASKED)
         numbers.append(f"{CLASS_NAMES[classes]}: {found.sum()} of {len(found)} runs, {ahead:.0%}")
-    return Finding(all(held.values()), held, tuple(numbers))
+    return Finding.of(held, numbers)
 
 
 def _judge_lif_worse(results: Results) -> Finding:
@@ -242,22 +248,15 @@ def _judge_lif_worse(results: Results) -> Finding:
             worse, words = [], []
             for other in ("MST", "GNM"):
                 ratios = [
-                    _ratio(
-                        _scores(data, classes, start, f"LIF {refractory}"),
-                        _scores(data, classes, start, other),
-                    )
-                    for classes in _counts(data)
-                    if classes > 1
+                    _ratio(data, c, start, f"LIF {refractory}", other)
+                    for c in counts_of(data)
+                    if c > 1
                 ]
                 worse += [ratio.below(1.0) for ratio in ratios]
                 words.append(f"LIF / {other} " + ", ".join(f"{ratio:.2f}" for ratio in ratios))
             numbers.append(f"{start}, refractory {refractory}, two classes on: {'; '.join(words)}")
             held[f"the start is {start} and the refractory period {refractory}"] = all(worse)
-    return Finding(all(held.values()), held, tuple(numbers))
-
-
-def _ratio(above: NDArray[Any], below: NDArray[Any]) -> Interval:
-    return bootstrap(lambda a, b: float(a.mean() / max(b.mean(), 1.0)), above, below)
+    return Finding.of(held, numbers)
 
 
 def _judge_reasons(results: Results) -> Finding:
@@ -266,12 +265,11 @@ def _judge_reasons(results: Results) -> Finding:
     numbers = []
     for start, free in (("matched", "GNM"), ("wide", "GNM, initial weights of the LIF")):
         resets, waits = [], []
-        for classes in _counts(data):
+        for classes in counts_of(data):
             if classes == 1:
                 continue
-            alone = _scores(data, classes, start, "LIF 0")
-            reset = _ratio(alone, _scores(data, classes, start, free))
-            wait = _ratio(_scores(data, classes, start, "LIF 25"), alone)
+            reset = _ratio(data, classes, start, "LIF 0", free)
+            wait = _ratio(data, classes, start, "LIF 25", "LIF 0")
             resets.append(reset.below(1.0))
             waits.append(wait.below(1.0))
             numbers.append(
@@ -373,13 +371,9 @@ def _draw(results: Results) -> Figure:
 def _draw_times(axes: Any, data: xr.Dataset) -> None:
     scores = score(data).sel(classes=2)
     for name, colour, mark in (("discrete", BLUE, "o"), ("continuous", RED, "s")):
-        rows = by_seed(scores.sel(learner=name).transpose("pattern_seed", "alpha"))
-        found = [mean(column) for column in rows.T]
-        middle = np.array([one.value for one in found])
-        ends = np.array([[one.value - one.low, one.high - one.value] for one in found]).T
-        axes.errorbar(
-            scores["alpha"].values, middle, ends, fmt=mark, ls="-", ms=3, lw=1, color=colour,
-            mfc="white", label=f"{name} time",
+        error_bars(
+            axes, scores["alpha"].values, means(by_seed(scores.sel(learner=name), "alpha")),
+            fmt=mark, ls="-", ms=3, lw=1, color=colour, mfc="white", label=f"{name} time",
         )  # fmt: skip
     silent_line(axes, SILENT)
     axes.set(xscale="log", xlabel="α (1/bin)", ylabel="bins survived", ylim=(0, None))
@@ -392,7 +386,7 @@ def _draw_times(axes: Any, data: xr.Dataset) -> None:
 def _draw_momentum(axes: Any, data: xr.Dataset) -> None:
     errors = 100.0 * data["error_rate"].sel(classes=2)
     for name, colour, mark in zip(MOMENTUM, (BLUE, INK, RED), "osD", strict=True):
-        rows = by_seed(errors.sel(learner=name).transpose("pattern_seed", "trials"))
+        rows = by_seed(errors.sel(learner=name), "trials")
         axes.plot(LENGTHS, rows.mean(0), mark, ls="-", ms=3, lw=1, color=colour, mfc="white",
                   label=name)  # fmt: skip
     axes.set(xscale="log", xlabel="trials of training", ylabel="wrong trials (%)")
@@ -403,19 +397,14 @@ def _draw_momentum(axes: Any, data: xr.Dataset) -> None:
 
 
 def _draw_reasons(axes: Any, data: xr.Dataset) -> None:
-    counts = [count for count in _counts(data) if count > 1]
+    counts = [count for count in counts_of(data) if count > 1]
     rows = (("matched", "GNM", -0.15, BLUE, "o"),
             ("wide", "GNM, initial weights of the LIF", 0.15, RED, "s"))  # fmt: skip
     for start, free, shift, colour, mark in rows:
         for refractory, fill in ((0, "white"), (25, colour)):
-            found = [
-                _ratio(_scores(data, c, start, f"LIF {refractory}"), _scores(data, c, start, free))
-                for c in counts
-            ]
-            middle = np.array([one.value for one in found])
-            ends = np.array([[one.value - one.low, one.high - one.value] for one in found]).T
-            axes.errorbar(
-                np.array(counts) + shift, middle, ends, fmt=mark, ms=3.5, lw=1, color=colour,
+            found = [_ratio(data, c, start, f"LIF {refractory}", free) for c in counts]
+            error_bars(
+                axes, np.array(counts) + shift, found, fmt=mark, ms=3.5, lw=1, color=colour,
                 mfc=fill, label=f"{start}, {'reset' if refractory == 0 else '+ 25 bins'}",
             )  # fmt: skip
     axes.axhline(1.0, color=INK, lw=0.8, ls="--")
@@ -430,15 +419,13 @@ def _draw_spikiness(results: Results) -> Figure:
     """What the best η > 0 gains over the best η = 0, by classes and readout."""
     figure, grid = panels(1, 2, width=WIDE, height=2.4, sharey=True)
     data = results["SPIKINESS"]
-    counts = _counts(data)
+    counts = counts_of(data)
     for axes, readout, name in zip(grid[0], READOUTS, "ab", strict=True):
         for classes in counts:
             one = score(data).sel(classes=classes, readout=readout)
-            gain = _gain_on_other_seeds(by_seed(one.transpose("pattern_seed", "eta", "alpha")))
-            axes.errorbar(
-                classes, gain.value, [[gain.value - gain.low], [gain.high - gain.value]], fmt="o",
-                ms=4, lw=1.2, color=RED if gain.above(0.0) else INK, mfc="white",
-            )  # fmt: skip
+            gain = _gain_on_other_seeds(by_seed(one, "eta", "alpha"))
+            colour = RED if gain.above(0.0) else INK
+            error_bars(axes, classes, gain, fmt="o", ms=4, lw=1.2, color=colour, mfc="white")
         axes.axhline(0.0, color=INK, lw=0.8, ls="--")
         axes.set(xlabel="classes", xticks=counts)
         letter(axes, f"{name}   readout {readout}")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from agents import GNM, LIF, AggregateLabel, NeuronAgent, Recording, record
 from agents.experiments.design import Axis, Block, Experiment, Variable
 from agents.experiments.figures import Picture
+from agents.experiments.statistics import by_seed
 from agents.experiments.verdict import Claim, Finding, Results
 from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
 from gnm_env import Task, Trial
@@ -81,9 +82,7 @@ def _balance(block: Block) -> dict[str, NDArray[Any]]:
         overdraft.append(np.max(np.where(before >= 0.0, taken - before, -np.inf)))
         leak = (1.0 - neuron.eta) * neuron.alpha
         share.append(neuron.eta * neuron.gamma * run.R.max() + leak)
-    return {
-        "overdraft": np.reshape(overdraft, block.shape), "share": np.reshape(share, block.shape)
-    }  # fmt: skip
+    return block.shaped(overdraft=overdraft, share=share)
 
 
 STEP = GNM(
@@ -143,7 +142,7 @@ def first_crossing(V: NDArray[np.float64]) -> int:
 
 def _judge_as_lif(results: Results) -> Finding:
     data = results["AS-LIF"]
-    lif, gnm = (data[name].transpose("pattern_seed", "bin").to_numpy() for name in TRACES)
+    lif, gnm = (by_seed(data[name], "bin") for name in TRACES)
     before, after, late = [], [], []
     for one, other in zip(lif, gnm, strict=True):
         first = first_crossing(one)
@@ -218,7 +217,7 @@ def _draw_balance(axes: Any, data: xr.Dataset) -> None:
 
 
 def _draw_as_lif(axes: Any, data: xr.Dataset) -> None:
-    lif, gnm = (data[name].transpose("pattern_seed", "bin").to_numpy() for name in TRACES)
+    lif, gnm = (by_seed(data[name], "bin") for name in TRACES)
     firsts = [first_crossing(one) for one in lif]
     run = next(k for k, first in enumerate(firsts) if 4 <= first < BINS - SHOWN.stop)
     start = firsts[run] - 4

@@ -25,14 +25,8 @@ from numpy.typing import NDArray
 from agents import noisy_performance, train_many
 from agents.experiments.conditions import AUTHORS, CONDITIONS, Condition, Treatment
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
-from agents.experiments.statistics import Interval, bootstrap
-from agents.experiments.training import (
-    make_agent,
-    pattern_seeds,
-    protocol,
-    task_of,
-    training_seed,
-)
+from agents.experiments.statistics import Interval, bootstrap, by_seed
+from agents.experiments.training import make_agent, pattern_seeds, protocol, task_of, training_seed
 from gnm_env import Patterns, Task
 from gnm_env.levels import evaluation_seed
 
@@ -261,15 +255,10 @@ def stage(
 ) -> Experiment:
     """The experiment that trains what the protocols need on these pattern seeds."""
     settings = neurons(protocols)
+    rows = dict(enumerate(settings))
     axes = (
         pattern_seeds(seeds),
-        Axis(
-            "neuron",
-            tuple(range(len(settings))),
-            chunk=_SIDE_BY_SIDE,
-            settings=tuple(settings),
-            long_name="neuron, by its settings",
-        ),
+        Axis.named("neuron", rows, _SIDE_BY_SIDE, "neuron, by its settings"),
     )
     checkpoints = sorted(
         {one.condition.treatment(p.neuron).trials for one in protocols for p in PROBES.values()}
@@ -314,7 +303,7 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
                     [agents[k] for k in due], task, patterns, runs, cap,
                     evaluation_seed(classes, seed), threads=1,
                 )  # fmt: skip
-    return {"survived": survived.reshape(*block.shape, len(checkpoints), runs)}
+    return block.shaped(survived=survived)
 
 
 class Scores:
@@ -324,8 +313,7 @@ class Scores:
         described = results.attrs["settings"]
         self._place = {_key(one): k for k, one in enumerate(described["sets"]["neuron"])}
         self._checkpoint = {t: k for k, t in enumerate(described["common"]["checkpoints"])}
-        survived = results["survived"].transpose("pattern_seed", "neuron", "checkpoint", "run")
-        values = survived.to_numpy()
+        values = by_seed(results["survived"], "neuron", "checkpoint", "run")
         self._at = {cap: np.minimum(values, cap).mean(-1) for cap in CAPS}
 
     def of(self, protocol_: Protocol) -> Array:

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from agents import answers, train_many
 from agents.experiments.design import Axis, Block, Experiment, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, mean
+from agents.experiments.statistics import Interval, by_seed, mean, means
 from agents.experiments.training import learners, make_agent, pattern_seeds, protocol
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import OKABE_ITO, WIDE, letter, panels
+from agents.plotting import OKABE_ITO, WIDE, band, legend_above, letter, panels
 from agents.training.batch import Answers
 from gnm_env import Patterns, Task
 
@@ -128,13 +128,12 @@ def _compute(block: Block) -> dict[str, NDArray[Any]]:
     )
     told = answers(agents, task, patterns, shared["answered"], ASKING + seed)
     owed = task.mean_occurrences * sum(task.owed)
-    values = {
-        "curve": history.mean_error.T / owed,
-        "error": told.absolute / (told.trials * owed),
-        "right": share_right(told, task.owed),
-        "false_positives": told.false_positives / told.table.sum((1, 2)),
-    }
-    return {name: np.reshape(v, (*block.shape, *v.shape[1:])) for name, v in values.items()}
+    return block.shaped(
+        curve=history.mean_error.T / owed,
+        error=told.absolute / (told.trials * owed),
+        right=share_right(told, task.owed),
+        false_positives=told.false_positives / told.table.sum((1, 2)),
+    )
 
 
 def share_right(told: Answers, owed: tuple[int, ...]) -> NDArray[np.float64]:
@@ -152,8 +151,7 @@ TOLD_WHERE = ("GNM, PeakError", "MST, PeakError")
 
 def values_of(data: xr.Dataset, what: str, task: str, learner: str) -> NDArray[np.float64]:
     """A variable by pattern seed, and by point if it is the learning curve."""
-    found = data[what].sel(task=task, learner=learner)
-    return np.asarray(found.transpose("pattern_seed", ...).to_numpy())
+    return by_seed(data[what].sel(task=task, learner=learner))
 
 
 def error_of(data: xr.Dataset, task: str, learner: str) -> Interval:
@@ -173,7 +171,7 @@ def _judge_solved(results: Results, solvers: tuple[str, ...]) -> Finding:
         found = {task: error_of(data, task, learner) for task in _tasks(data)}
         held[f"it is {learner}"] = all(one.below(SOLVED) for one in found.values())
         words.append(f"{learner}: " + "; ".join(f"{t} {one:.1%}" for t, one in found.items()))
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_parts(results: Results) -> Finding:
@@ -185,7 +183,7 @@ def _judge_parts(results: Results) -> Finding:
         where = learner in TOLD_WHERE
         held[f"it is {learner}"] = found.above(0.95) if where else found.below(0.9)
         words.append(f"{learner}: {found:.0%}, {noise:.2f} spikes in noise per presentation")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_gradient(results: Results) -> Finding:
@@ -197,7 +195,7 @@ def _judge_gradient(results: Results) -> Finding:
             gain = mean(values_of(data, "error", task, other) - own)
             held[f"it is {task} beside {other}"] = gain.above(0.0)
             words.append(f"{task}, {other} − CriticalThreshold: {gain:+.1%}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 _PROTOCOL = (
@@ -286,9 +284,7 @@ def _draw(results: Results) -> Figure:
     grid[1, 0].set_ylim(len(LEARNERS) - 0.5, -0.5)
     grid[1, len(names) // 2].set_xlabel("presentations given what they are owed (%)")
     grid[0, len(names) // 2].set_xlabel("trials heard")
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7
-    )
+    legend_above(figure, grid[0, 0], 4)
     return figure
 
 
@@ -298,10 +294,8 @@ def _draw_curves(axes: Axes, data: xr.Dataset, task: str) -> None:
     heard = np.arange(1, POINTS + 1) * (trials / POINTS)
     for learner in LEARNERS:
         curve = values_of(data, "curve", task, learner)
-        found = np.maximum([mean(point) for point in curve.T], FLOOR)
-        look = _look(learner)
-        axes.plot(heard, found[:, 0], lw=1.1, label=learner, **look)
-        axes.fill_between(heard, found[:, 1], found[:, 2], color=look["color"], alpha=0.12, lw=0)
+        found = np.maximum(means(curve), FLOOR)
+        band(axes, heard, found, dense=0.12, lw=1.1, label=learner, **_look(learner))
     axes.axhline(SOLVED, color="0.5", lw=0.8, ls=":")
     axes.set_yscale("log")
     axes.set_xlim(0, trials)

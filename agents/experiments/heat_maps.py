@@ -19,12 +19,21 @@ from agents.experiments.statistics import (
     PER_THOUSAND,
     bootstrap,
     by_seed,
+    counts_of,
     mean,
+    means,
     mistake_rates,
     score,
     typical_rate,
 )
-from agents.experiments.training import RUN, class_counts, pattern_seeds, training
+from agents.experiments.training import (
+    RUN,
+    alpha_axis,
+    class_counts,
+    eta_axis,
+    pattern_seeds,
+    training,
+)
 from agents.experiments.verdict import (
     Claim,
     Finding,
@@ -34,17 +43,7 @@ from agents.experiments.verdict import (
     Tried,
     from_both_starts,
 )
-from agents.plotting import (
-    BINS,
-    BLUE,
-    INK,
-    MAP,
-    RED,
-    WIDE,
-    letter,
-    panels,
-    silent_line,
-)
+from agents.plotting import BINS, BLUE, INK, MAP, RED, WIDE, band, letter, panels, silent_line
 from gnm_env import Task
 
 if TYPE_CHECKING:
@@ -57,18 +56,14 @@ if TYPE_CHECKING:
 # --- the grid ------------------------------------------------------------------------------------
 
 _COARSE = (0, 1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 28, 32, 36, 40)
-ALPHA = {
-    "quick": tuple(k / 40 for k in _COARSE),
-    "paper": tuple(k / 40 for k in range(41)),
-}
+ALPHA = {"quick": tuple(k / 40 for k in _COARSE), "paper": tuple(k / 40 for k in range(41))}
 ETA = {"quick": tuple(k / 10 for k in range(11)), "paper": ALPHA["paper"]}
 SEEDS = {"quick": range(2), "paper": range(5)}
 
-READOUT = Axis(
+READOUT = Axis.named(
     "readout",
-    ("V", "D"),
     # D = αV has to reach the threshold, which bounded weights would forbid at small α.
-    settings=({"readout": "V"}, {"readout": "D", "weight_bounds": None}),
+    {"V": {"readout": "V"}, "D": {"readout": "D", "weight_bounds": None}},
     long_name="variable that is compared with the readout threshold",
 )
 
@@ -77,8 +72,8 @@ def _plane(size: str, seeds: tuple[int, ...] | None) -> tuple[Axis, Axis, Axis]:
     # Three columns of η a block: some ten seconds of work, and enough neurons side by side.
     return (
         pattern_seeds(seeds or SEEDS[size]),
-        Axis("eta", ETA[size], chunk=3, long_name="η, model choice"),
-        Axis("alpha", ALPHA[size], chunk=0, units="1/bin", long_name="α, decay per bin"),
+        eta_axis(ETA[size], chunk=3),
+        alpha_axis(ALPHA[size]),
     )
 
 
@@ -300,20 +295,14 @@ def _judge_classes(results: Results) -> Finding:
 def _judge_low_cap(results: Results) -> Finding:
     """F3f: the map at the cap of figure 3a, both readouts."""
     low = {f"readout V, {start}": _one_class(results, start, CAP_OF_A) for start in _MAPS}
-    coarse = score(results["SPIKINESS"], CAP_OF_A).sel(classes=1, readout="D")
-    found = {
-        name: _low_cap(scores) for name, scores in (low | {"readout D, matched": coarse}).items()
-    }
-    return Finding(
-        all(one.holds for one in found.values()),
-        {f"it is {name} initial weights": one.holds for name, one in found.items()},
-        tuple(f"{name}: {one.words}" for name, one in found.items()),
-        forest=Forest(
-            "score at η = 0, α = 0.3 / best cell",
-            NEAR_BEST,
-            1.0,
-            tuple(Mark(name, one.value, one.holds) for name, one in found.items() if one.value),
-        ),
+    low["readout D, matched"] = score(results["SPIKINESS"], CAP_OF_A).sel(classes=1, readout="D")
+    found = {name: _low_cap(scores) for name, scores in low.items()}
+    marks = tuple(Mark(name, one.value, one.holds) for name, one in found.items() if one.value)
+    return Finding.of(
+        {name: one.holds for name, one in found.items()},
+        (f"{name}: {one.words}" for name, one in found.items()),
+        "it is {} initial weights",
+        Forest("score at η = 0, α = 0.3 / best cell", NEAR_BEST, 1.0, marks),
     )
 
 
@@ -325,7 +314,7 @@ def _low_cap(scores: xr.DataArray) -> Tried:
     column = scores.sel(eta=0.0)
     edge = mean(by_seed(column.sel(alpha=0.05)))
     fall = mean(by_seed(column.sel(alpha=0.3) - column.sel(alpha=1.0)))
-    cells = by_seed(scores.transpose("pattern_seed", "eta", "alpha"))
+    cells = by_seed(scores, "eta", "alpha")
     at = int(np.flatnonzero(np.isclose(scores["alpha"], 0.3))[0])
 
     def near_best(sample: NDArray[np.float64]) -> float:
@@ -349,17 +338,11 @@ def _judge_eta_zero(results: Results) -> Finding:
         average = sample.mean(axis=0)
         return float(average[0].max() / average.max())
 
-    found = {
-        c: bootstrap(share, by_seed(four.sel(classes=c).transpose("pattern_seed", "eta", "alpha")))
-        for c in (2, 3, 4)
-    }
+    found = {c: bootstrap(share, by_seed(four.sel(classes=c), "eta", "alpha")) for c in (2, 3, 4)}
     held = {c: value.value >= 0.9 for c, value in found.items()}
-    words = [f"{c} classes {value:.0%}" for c, value in found.items()]
-    return Finding(
-        all(held.values()),
-        {f"the task has {c} classes": holds for c, holds in held.items()},
-        ("best at η = 0 as a share of the best at any η: " + ", ".join(words),),
-    )
+    words = ", ".join(f"{c} classes {value:.0%}" for c, value in found.items())
+    told = f"best at η = 0 as a share of the best at any η: {words}"
+    return Finding.of(held, (told,), "the task has {} classes")
 
 
 CLAIMS = (
@@ -486,7 +469,7 @@ def _draw_more_classes(results: Results, readout: str) -> Figure:
     """Maps for two, three and four classes: capped score above mistake rate."""
     maps = results["F4"].sel(readout=readout)
     figure, grid = panels(2, 3, width=WIDE, height=7.2)
-    for column, classes in enumerate(int(c) for c in maps["classes"]):
+    for column, classes in enumerate(counts_of(maps)):
         one = maps.sel(classes=classes)
         mst = _mst(results, classes, "matched")
         levels = [PAPER_LEVELS["best"]] if classes == 4 else []
@@ -502,7 +485,7 @@ def _draw_more_classes(results: Results, readout: str) -> Figure:
 
 def _edge_note(maps: xr.Dataset) -> str:
     """For a caption: which α* lie at an end of the range in which they were sought, if any do."""
-    lines = {int(c): optimal_line(_average(score(maps.sel(classes=c)))) for c in maps["classes"]}
+    lines = {c: optimal_line(_average(score(maps.sel(classes=c)))) for c in counts_of(maps)}
     ends = [f"{line.alpha:g} ({CLASS_NAMES[c]})" for c, line in lines.items() if line.at_edge]
     if not ends:
         return ""
@@ -633,10 +616,8 @@ def curves(axes: Axes, scores: xr.DataArray) -> None:
     axes.add_collection(LineCollection(lines, colors=BLUE, linewidths=0.6, alpha=0.3, label=label))
     ahead = best(spiky).eta
     for eta, colour, look in ((ahead, BLUE, "s--"), (0.0, RED, "o-")):
-        column = by_seed(scores.sel(eta=eta).transpose("pattern_seed", "alpha"))
-        found = np.array([mean(values) for values in column.T])
-        axes.fill_between(alphas, found[:, 1], found[:, 2], color=colour, alpha=0.2, lw=0)
-        axes.plot(alphas, found[:, 0], look, color=colour, lw=1.6, ms=2.5, label=f"η = {eta:g}")
+        found = means(by_seed(scores.sel(eta=eta), "alpha"))
+        band(axes, alphas, found, look, color=colour, lw=1.6, ms=2.5, label=f"η = {eta:g}")
     axes.set(xlabel=_ALPHA_LABEL, ylabel=BINS, xlim=(0, 1))
     axes.set_ylim(0, 1.05 * float(scores.max()))
     silent_line(axes, SILENT)
@@ -647,9 +628,9 @@ def _draw_against_alpha(results: Results) -> Figure:
     """Performance against α for two, three and four classes."""
     maps = results["F4"].sel(readout="V")
     figure, grid = panels(3, 1, width=WIDE, height=6.4, sharex=True)
-    for axes, classes, name in zip(grid[:, 0], maps["classes"].to_numpy(), "abc", strict=True):
+    for axes, classes, name in zip(grid[:, 0], counts_of(maps), "abc", strict=True):
         curves(axes, score(maps.sel(classes=classes)))
-        letter(axes, f"{name}   {CLASS_NAMES[int(classes)]}")
+        letter(axes, f"{name}   {CLASS_NAMES[classes]}")
         axes.label_outer()
     return figure
 

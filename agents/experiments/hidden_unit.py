@@ -20,10 +20,21 @@ from numpy.typing import NDArray
 
 from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
+from agents.experiments.statistics import Interval, bootstrap, by_seed, goodness, mean, score
 from agents.experiments.training import class_counts, learners, pattern_seeds, training
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, letter, panels, silent_line
+from agents.plotting import (
+    BINS,
+    BLUE,
+    GREY,
+    INK,
+    RED,
+    WIDE,
+    error_bars,
+    letter,
+    panels,
+    silent_line,
+)
 from gnm_env import Task
 
 if TYPE_CHECKING:
@@ -109,13 +120,9 @@ def scores_of(data: xr.Dataset, learner: str) -> NDArray[np.float64]:
 
 
 def goodness_of(data: xr.Dataset, learner: str) -> NDArray[np.float64]:
-    """−log10 of the mistakes per bin by pattern seed; half a mistake is added, so that none has a
-    value."""
-    cap = data.attrs["settings"]["common"]["cap"]
-    bins = data["survived"].sel(classes=2, learner=learner).transpose("pattern_seed", "run")
-    survived = bins.to_numpy()
-    rate = ((survived < cap).sum(-1) + 0.5) / np.maximum(survived.sum(-1), 1)
-    return np.asarray(-np.log10(rate))
+    """−log10 of the mistakes per bin by pattern seed."""
+    survived = by_seed(data["survived"].sel(classes=2, learner=learner), "run")
+    return goodness(survived, data.attrs["settings"]["common"]["cap"])
 
 
 def share_of_gain(
@@ -136,7 +143,7 @@ def _judge_sigmoid(results: Results) -> Finding:
         share = share_of_gain(part, whole, base)
         held[f"the two stages decay by {name}"] = share.below(0.5)
         words.append(f"two linear stages, {name}: {mean(part):,.0f} bins, share {share:.0%}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_rule(results: Results) -> Finding:
@@ -148,7 +155,7 @@ def _judge_rule(results: Results) -> Finding:
         gain = mean(peak - bp)
         held[f"the network has {hidden} hidden"] = gain.above(0)
         words.append(f"BP, {hidden} hidden: {mean(bp):,.0f} bins; PeakError − BP {gain:+,.0f}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_second_stage(results: Results) -> Finding:
@@ -264,7 +271,8 @@ def _draw(results: Results) -> Figure:
         scores = scores_of(data, learner)
         x = place + jitter.uniform(-0.2, 0.2, len(scores))
         axes.plot(x, scores, "o", color=colour, ms=2.8, alpha=0.5, mew=0)
-        _mean_mark(axes, place + 0.32, mean(scores), INK)
+        look = {"fmt": "D", "ms": 3.5, "color": INK, "mfc": "white", "lw": 1.1}
+        error_bars(axes, place + 0.32, mean(scores), **look)
     axes.set_xticks(range(len(_SHOWN)), [name for name, _ in _SHOWN.values()], fontsize=6)
     axes.set_xlim(-0.6, len(_SHOWN) - 0.3)
     for between, name, colour in (
@@ -300,13 +308,6 @@ def _draw_networks(axes: Axes, data: xr.Dataset) -> None:
     axes.set(xlabel="hidden neurons", ylabel=BINS)
     axes.legend(fontsize=6, loc="lower right")
     letter(axes, "a   networks")
-
-
-def _mean_mark(axes: Axes, place: float, found: Interval, colour: str) -> None:
-    axes.errorbar(
-        place, found.value, [[found.value - found.low], [found.high - found.value]],
-        fmt="D", ms=3.5, color=colour, mfc="white", lw=1.1,
-    )  # fmt: skip
 
 
 EXPERIMENTS = {"HIDDEN": hidden_unit}

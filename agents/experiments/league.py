@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from agents import noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Experiment, Setting, Variable
 from agents.experiments.methods import LIF_ALL, MODULATED, MST_ALL
-from agents.experiments.statistics import mean, median
+from agents.experiments.statistics import counted, mean, median
 from agents.experiments.store import read
 from agents.experiments.training import (
     class_counts,
@@ -131,7 +131,7 @@ def league(
     axes = (
         pattern_seeds(seeds),
         class_counts(*CLASSES[size]),
-        Axis("learner", tuple(rows), settings=tuple(rows.values()), long_name="who learns"),
+        Axis.named("learner", rows, long_name="who learns"),
     )
     common = {**RUN, **({"most": steps} if steps and part == "rl" else {})}
     return Experiment(
@@ -479,7 +479,7 @@ def text_table(table: Sequence[dict[str, Any]]) -> str:
         rule = "|" + "|".join("-" * (w + 1) + ("-" if k == 0 else ":") for k, w in
                               enumerate(widths)) + "|"  # fmt: skip
         title = (
-            f"{classes} class{'es' if classes > 1 else ''}; equal experience: "
+            f"{counted(classes)}; equal experience: "
             f"{chosen[0]['equal_experience'] / 1e6:g} million bins. Mean noisy performance over "
             "pattern seeds [95 % interval], in bins:"
         )
@@ -526,12 +526,7 @@ def _curves(axes: Any, results: Sequence[xr.Dataset], classes: int) -> None:
     axes.axvline(results[0].attrs["budget"][classes], color="0.7", linewidth=0.8, zorder=0)
     axes.annotate("silent", (0.01, SILENT_SCORE), xycoords=("axes fraction", "data"),
                   fontsize=8, color="0.3", va="bottom")  # fmt: skip
-    axes.set(
-        xscale="log",
-        ylim=(0, CAP),
-        xlabel="bins heard in training",
-        title=f"{classes} class{'es' if classes > 1 else ''}",
-    )
+    axes.set(xscale="log", ylim=(0, CAP), xlabel="bins heard in training", title=counted(classes))
 
 
 def _curve(axes: Any, learner: xr.Dataset, name: str) -> None:

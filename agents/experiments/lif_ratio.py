@@ -13,7 +13,7 @@ from agents.experiments.methods import GNM_ALL, LIF_ALL, initial_weights
 from agents.experiments.statistics import Interval, bootstrap, by_seed, rate, score
 from agents.experiments.training import STARTS, class_counts, learners, pattern_seeds, training
 from agents.experiments.verdict import Claim, Finding, Forest, Results, Tried, from_both_starts
-from agents.plotting import BLUE, INK, RED, WIDE, letter, panels
+from agents.plotting import BLUE, INK, RED, WIDE, band, letter, panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,11 +69,10 @@ def mistakes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mistakes and bins survived of GNM, LIF 0, LIF 1, … by pattern seed, (seeds, neurons, 2)."""
     cell = results["survived"].sel(classes=classes, start=start)
-    bins = cell.transpose("pattern_seed", "learner", "run")
     cap = results.attrs["settings"]["common"]["cap"]
+    lif, gnm = (by_seed(cell.sel(learner=names), "learner", "run") for names in (_LIF, ["GNM"]))
     counts = [
-        np.stack([(part < cap).sum(-1), part.sum(-1)], axis=-1).astype(float)
-        for part in (bins.sel(learner=_LIF).to_numpy(), bins.sel(learner=["GNM"]).to_numpy())
+        np.stack([(part < cap).sum(-1), part.sum(-1)], axis=-1).astype(float) for part in (lif, gnm)
     ]
     return counts[0], counts[1]
 
@@ -204,7 +203,7 @@ def _draw(results: Results) -> Figure:
         for axes, start in zip(row, STARTS, strict=True):
             for classes, colour, mark in ((1, BLUE, "o"), (3, RED, "s")):
                 lif, gnm = read(results["F6"], classes, start)
-                band = np.array([
+                found = np.array([
                     bootstrap(
                         lambda a, b, k=k, f=compare: float(f(a[:, [k]], b)[0]), lif, gnm,
                         resamples=500,
@@ -212,12 +211,10 @@ def _draw(results: Results) -> Figure:
                     for k in range(len(REFRACTORY))
                 ])  # fmt: skip
                 words = "one class" if classes == 1 else "three classes"
-                axes.fill_between(
-                    REFRACTORY, band[:, 1], band[:, 2], color=colour, alpha=0.18, lw=0
-                )
-                axes.plot(
-                    REFRACTORY, band[:, 0], color=colour, marker=mark, ms=3, lw=1.2, label=words
-                )
+                band(
+                    axes, REFRACTORY, found, f"{mark}-", dense=0.18, color=colour, ms=3, lw=1.2,
+                    label=words,
+                )  # fmt: skip
             axes.axhline(1.0, color=INK, lw=0.9, ls="--", zorder=1)
             axes.set(xlim=(-0.5, REFRACTORY[-1] + 0.5), yscale="log")
             axes.set_yticks((0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5), minor=False)

@@ -15,10 +15,17 @@ from numpy.typing import NDArray
 from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.heat_maps import ALPHA, CLASS_NAMES, ETA, interpolation
-from agents.experiments.statistics import Interval, bootstrap, by_seed, score
-from agents.experiments.training import STARTS, class_counts, pattern_seeds, training
+from agents.experiments.statistics import Interval, bootstrap, by_seed, counts_of, score
+from agents.experiments.training import (
+    STARTS,
+    alpha_axis,
+    class_counts,
+    eta_axis,
+    pattern_seeds,
+    training,
+)
 from agents.experiments.verdict import Claim, Finding, Results
-from agents.plotting import INK, METHOD_COLOURS, METHOD_MARKS, WIDE, letter, panels
+from agents.plotting import INK, METHOD_COLOURS, METHOD_MARKS, WIDE, legend_above, letter, panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,8 +42,8 @@ def planes(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
         class_counts(1, 2, 3),
         pattern_seeds(seeds or SEEDS[size]),
         Axis("start", STARTS, long_name="initial weights"),
-        Axis("eta", ETA["quick"], chunk=0, long_name="η, model choice"),
-        Axis("alpha", ALPHA["quick"], chunk=0, units="1/bin", long_name="α, decay per bin"),
+        eta_axis(ETA["quick"]),
+        alpha_axis(ALPHA["quick"]),
     )
     return training("LINES", "Noisy performance over α and η, coarse, many runs", axes)
 
@@ -76,7 +83,7 @@ def gains(scores: xr.DataArray) -> tuple[float, Interval, dict[str, Interval]]:
 
     `scores` is (pattern_seed, eta, alpha); every line is sought anew in every resample.
     """
-    cells = by_seed(scores.transpose("pattern_seed", "eta", "alpha"))
+    cells = by_seed(scores, "eta", "alpha")
     cells = cells.reshape(len(cells), -1)
     paper = weights(PAPER)
 
@@ -105,7 +112,7 @@ FLAT = 1e-6
 def _judge(results: Results) -> Finding:
     scores = score(results["LINES"])
     held, words = {}, []
-    for classes in (int(c) for c in scores["classes"]):
+    for classes in counts_of(results["LINES"]):
         for start in STARTS:
             name = f"{CLASS_NAMES[classes]}, {start} initial weights"
             star, mean, found = gains(scores.sel(classes=classes, start=start))
@@ -140,8 +147,7 @@ CLAIMS = (
 
 def _draw(results: Results) -> Figure:
     """What the paper's line gains over each rival, for every task and start."""
-    scores = score(results["LINES"])
-    counts = [int(c) for c in scores["classes"]]
+    scores, counts = score(results["LINES"]), counts_of(results["LINES"])
     figure, grid = panels(1, len(STARTS), width=WIDE, height=3.2, sharey=True)
     for axes, start, name in zip(grid[0], STARTS, "ab", strict=True):
         for place, classes in enumerate(counts):
@@ -159,7 +165,7 @@ def _draw(results: Results) -> Figure:
         axes.set_xlabel("gain of (1−η)α = α* (% of its score)")
         letter(axes, f"{name}   {start} initial weights")
     grid[0, 0].invert_yaxis()
-    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    legend_above(figure, grid[0, 0], 4)
     return figure
 
 

@@ -20,16 +20,43 @@ from numpy.typing import NDArray
 from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.leaky_theory import naive_trap, signal_to_noise, trap
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
-from agents.experiments.training import WIDE_START, class_counts, pattern_seeds, training
+from agents.experiments.statistics import (
+    bootstrap,
+    by_seed,
+    counted,
+    counts_of,
+    mean,
+    means,
+    median,
+    ratio_of_means,
+    score,
+)
+from agents.experiments.training import (
+    WIDE_START,
+    alpha_axis,
+    class_counts,
+    pattern_seeds,
+    training,
+)
 from agents.experiments.verdict import Finding, Hypothesis, Results
 from agents.neurons.gnm import GNM
-from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, letter, panels, silent_line
+from agents.plotting import (
+    BINS,
+    BLUE,
+    GREY,
+    INK,
+    RED,
+    WIDE,
+    band,
+    legend_above,
+    letter,
+    panels,
+    silent_line,
+)
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # --- the grids -----------------------------------------------------------------------------------
@@ -46,10 +73,7 @@ RULES: dict[str, dict[str, Any]] = {
 
 TRAP_ALPHA = tuple(float(f"{a:.5f}") for a in np.geomspace(0.01, 0.1, 24))
 TRAP_TRIALS = 20_000
-WEIGHTS_UP_TO = {
-    "matched": GNM.default_initial_weight,
-    "wide": WIDE_START["gnm"],
-}
+WEIGHTS_UP_TO = {"matched": GNM.default_initial_weight, "wide": WIDE_START["gnm"]}
 
 SIZES = {"quick": (range(100, 102), (1, 2)), "paper": (range(100, 124), (1, 2, 3, 4))}
 TRAP_SIZES = {"quick": (range(100, 104), (1,)), "paper": (range(100, 124), (1, 2))}
@@ -61,8 +85,8 @@ def memory(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (
         class_counts(*classes),
         pattern_seeds(seeds or usual),
-        Axis("method", tuple(RULES), 0, tuple(RULES.values()), long_name="learning rule"),
-        Axis("alpha", ALPHA, chunk=0, units="1/bin", long_name="α, decay per bin"),
+        Axis.named("method", RULES, chunk=0, long_name="learning rule"),
+        alpha_axis(ALPHA),
     )
     return training("MEMORY", "Performance against memory, by learning rule", axes)
 
@@ -70,12 +94,12 @@ def memory(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 def small_alpha(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """ALL at small α, from narrow and from wide initial weights."""
     usual, classes = TRAP_SIZES[size]
-    starts = tuple({"initial_weight": value} for value in WEIGHTS_UP_TO.values())
+    starts = {name: {"initial_weight": value} for name, value in WEIGHTS_UP_TO.items()}
     axes = (
         class_counts(*classes),
         pattern_seeds(seeds or usual),
-        Axis("weights_up_to", tuple(WEIGHTS_UP_TO), 0, starts, long_name="initial weights"),
-        Axis("alpha", TRAP_ALPHA, chunk=0, units="1/bin", long_name="α, decay per bin"),
+        Axis.named("weights_up_to", starts, chunk=0, long_name="initial weights"),
+        alpha_axis(TRAP_ALPHA),
     )
     title = "ALL at small α: trapped above the threshold"
     return training("TRAP", title, axes, keep_weights=True, trials=TRAP_TRIALS)
@@ -130,10 +154,6 @@ def measured_traps(data: xr.Dataset, classes: int, start: str) -> NDArray[np.flo
 # --- the hypotheses ------------------------------------------------------------------------------
 
 
-def _counted(classes: int) -> str:
-    return "1 class" if classes == 1 else f"{classes} classes"
-
-
 def _by(scores: xr.DataArray, rule: str) -> xr.DataArray:
     """The scores of one learning rule. (`method` is an argument of xarray's `sel` too.)"""
     return scores.sel({"method": rule})
@@ -146,16 +166,13 @@ NEAR = (2 / 3, 3 / 2)
 def _judge_trap(results: Results) -> Finding:
     data = results["TRAP"]
     held, middle, words = {}, {}, []
-    for classes in data["classes"].to_numpy():
+    for classes in counts_of(data):
         for start in WEIGHTS_UP_TO:
-            predicted = predicted_traps(data, int(classes), start)
-            measured = measured_traps(data, int(classes), start)
-            ratio = bootstrap(np.median, measured / predicted[:, 0])
-            simple = bootstrap(np.median, measured / predicted[:, 1])
-            near = np.mean(
-                (measured / predicted[:, 0] >= NEAR[0]) & (measured / predicted[:, 0] <= NEAR[1])
-            )
-            name = f"{_counted(classes)}, {start}"
+            measured = measured_traps(data, classes, start)
+            over, over_simple = measured / predicted_traps(data, classes, start).T
+            ratio, simple = median(over), median(over_simple)
+            near = np.mean((over >= NEAR[0]) & (over <= NEAR[1]))
+            name = f"{counted(classes)}, {start}"
             middle[name] = CLOSE[0] <= ratio.value <= CLOSE[1]
             held[name] = middle[name] and near >= 0.9
             words.append(
@@ -176,11 +193,7 @@ TIMES = 3.0
 def _judge_cliff(results: Results) -> Finding:
     scores = score(results["MEMORY"]).sel(classes=1, alpha=0.05)
     base = by_seed(_by(scores, "ALL"))
-    found = {
-        name: bootstrap(lambda a, b: float(a.mean() / b.mean()), by_seed(_by(scores, name)), base)
-        for name in RULES
-        if name != "ALL"
-    }
+    found = {n: ratio_of_means(by_seed(_by(scores, n)), base) for n in RULES if n != "ALL"}
     held = {name: times.above(TIMES) for name, times in found.items()}
     need = ("CriticalThreshold", "PeakError", "PeakError, [0, 1]")
     words = (
@@ -209,13 +222,12 @@ def _judge_optimum(results: Results) -> Finding:
     data = results["MEMORY"]
     ratio, scores = theory(data), _by(score(data), "PeakError")
     held, words = {}, []
-    for classes in (c for c in data["classes"].to_numpy() if c > 1):
-        told = by_seed(ratio.sel(classes=classes).transpose("pattern_seed", "alpha"))
-        got = by_seed(scores.sel(classes=classes).transpose("pattern_seed", "alpha"))
+    for classes in (c for c in counts_of(data) if c > 1):
+        told, got = (by_seed(one.sel(classes=classes), "alpha") for one in (ratio, scores))
         predicted = ALPHA[int(np.log(told).mean(axis=0).argmax())]
         measured = ALPHA[int(got.mean(axis=0).argmax())]
         agreement = bootstrap(_correlation, got, told, resamples=500)
-        held[int(classes)] = _steps_apart(predicted, measured) <= 1 and agreement.above(0.5)
+        held[classes] = _steps_apart(predicted, measured) <= 1 and agreement.above(0.5)
         words.append(
             f"{classes} classes: best α predicted {predicted:g}, measured {measured:g}; "
             f"correlation of score and signal-to-noise over seeds and α {agreement:.2f}"
@@ -227,16 +239,13 @@ def _judge_optimum(results: Results) -> Finding:
 def _judge_need(results: Results) -> Finding:
     data = results["MEMORY"]
     held, words = {}, []
-    for classes in data["classes"].to_numpy():
-        scores = by_seed(
-            _by(score(data), "PeakError").sel(classes=classes).transpose("pattern_seed", "alpha")
-        )
+    for classes in counts_of(data):
+        scores = by_seed(_by(score(data), "PeakError").sel(classes=classes), "alpha")
         share = bootstrap(_memoryless_share, scores)
-        held[int(classes)] = share.above(0.8) if classes == 1 else share.below(0.5)
-        words.append(f"{_counted(classes)}: {share:.0%}")
-    conditions = {f"the task has {_counted(c)}": holds for c, holds in held.items()}
+        held[counted(classes)] = share.above(0.8) if classes == 1 else share.below(0.5)
+        words.append(f"{counted(classes)}: {share:.0%}")
     text = "score without memory (α = 1) as a share of the best α's, PeakError: " + ", ".join(words)
-    return Finding(all(held.values()), conditions, (text,))
+    return Finding.of(held, (text,), "the task has {}")
 
 
 def _memoryless_share(scores: NDArray[np.float64]) -> float:
@@ -315,78 +324,56 @@ _STYLES = {
 }
 
 
-def _band(scores: xr.DataArray) -> NDArray[np.float64]:
-    """Mean with its interval at each α, (alphas, 3)."""
-    rows = by_seed(scores.transpose("pattern_seed", "alpha"))
-    found: list[Interval] = [mean(row) for row in rows.T]
-    return np.array(found)
-
-
 def _draw_memory(results: Results) -> Figure:
     """Scores against α by rule; below, the signal-to-noise ratio that no training enters."""
     data = results["MEMORY"]
     scores, told = score(data), theory(data)
-    counts = data["classes"].to_numpy()
+    counts = counts_of(data)
     figure, grid = panels(
         2, len(counts), width=WIDE, height=4.2, sharex=True, gridspec_kw={"height_ratios": [2.2, 1]}
     )
     for column, classes in enumerate(counts):
         top, low = grid[:, column]
         for name, (colour, mark, line) in _STYLES.items():
-            band = _band(_by(scores, name).sel(classes=classes))
-            shown = "white" if line == ":" else colour
-            top.plot(
-                ALPHA,
-                band[:, 0],
-                line,
-                color=colour,
-                marker=mark,
-                mfc=shown,
-                ms=3,
-                lw=1.1,
-                label=name,
-            )
-            top.fill_between(ALPHA, band[:, 1], band[:, 2], color=colour, alpha=0.13, lw=0)
+            found = means(by_seed(_by(scores, name).sel(classes=classes), "alpha"))
+            inside = "white" if line == ":" else colour
+            band(
+                top, ALPHA, found, line, dense=0.13, color=colour, marker=mark, mfc=inside, ms=3,
+                lw=1.1, label=name,
+            )  # fmt: skip
         if column == len(counts) - 1:
             silent_line(top, Task().silent_score)
         else:  # the line alone: its name would stand in the next panel
             top.axhline(Task().silent_score, color=GREY, lw=0.8, ls=":", zorder=1)
         top.set_ylim(0, 10_300)
         top.tick_params(labelleft=column == 0)
-        ratios = _band(told.sel(classes=classes))
-        low.fill_between(ALPHA, ratios[:, 1], ratios[:, 2], color=BLUE, alpha=0.2, lw=0)
-        low.plot(ALPHA, ratios[:, 0], color=BLUE, lw=1.3)
+        ratios = means(by_seed(told.sel(classes=classes), "alpha"))
+        band(low, ALPHA, ratios, color=BLUE, lw=1.3)
         best = ALPHA[int(ratios[:, 0].argmax())]
         for axes in (top, low):
             axes.axvline(best, color=BLUE, lw=0.8, ls="--", zorder=0)
         low.set_ylim(bottom=0)
-        _log_alpha(low)
-        letter(top, f"{'abcd'[column]}   {_counted(classes)}")
+        low.set_xscale("log")
+        low.set_xticks((0.02, 0.1, 0.3, 1.0), ("0.02", "0.1", "0.3", "1"))
+        low.minorticks_off()
+        letter(top, f"{'abcd'[column]}   {counted(classes)}")
     grid[0, 0].set_ylabel(BINS)
     grid[1, 0].set_ylabel("signal / noise (SD)")
     figure.supxlabel("α (decay per bin)", fontsize=8)
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=7
-    )
+    legend_above(figure, grid[0, 0], 5)
     return figure
-
-
-def _log_alpha(axes: Axes) -> None:
-    axes.set_xscale("log")
-    axes.set_xticks((0.02, 0.1, 0.3, 1.0), ("0.02", "0.1", "0.3", "1"))
-    axes.minorticks_off()
 
 
 def _draw_trap(results: Results) -> Figure:
     """Predicted against measured α at which the trap opens, seed by seed."""
     data = results["TRAP"]
-    counts = data["classes"].to_numpy()
+    counts = counts_of(data)
     figure, grid = panels(1, len(counts), width=WIDE, height=3.0, sharey=True)
     ends = TRAP_ALPHA[0] * 0.95, TRAP_ALPHA[-1] * 1.05
     for axes, classes, name in zip(grid[0], counts, "ab", strict=False):
         for start, colour, mark in (("matched", BLUE, "o"), ("wide", RED, "s")):
-            predicted = predicted_traps(data, int(classes), start)
-            measured = measured_traps(data, int(classes), start)
+            predicted = predicted_traps(data, classes, start)
+            measured = measured_traps(data, classes, start)
             axes.plot(predicted[:, 0], measured, mark, color=colour, ms=3.5, mew=0, alpha=0.6,
                       label=f"{start} initial weights, crossings")  # fmt: skip
             axes.plot(predicted[:, 1], measured, mark, color=colour, ms=3.5, mfc="none", mew=0.6,
@@ -396,7 +383,7 @@ def _draw_trap(results: Results) -> Figure:
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_ticks((0.01, 0.02, 0.05, 0.1), ("0.01", "0.02", "0.05", "0.1"))
         axes.minorticks_off()
-        letter(axes, f"{name}   {_counted(classes)}")
+        letter(axes, f"{name}   {counted(classes)}")
     grid[0, 0].set_ylabel("α below which ALL is trapped")
     grid[0, 0].legend(fontsize=6, loc="upper left")
     return figure

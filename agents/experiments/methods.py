@@ -29,6 +29,7 @@ from agents.plotting import (
     METHOD_MARKS,
     RED,
     WIDE,
+    error_bars,
     letter,
     panels,
     silent_line,
@@ -140,17 +141,15 @@ def _judge_error_trace(results: Results) -> Finding:
             held[name, start] = found.share >= 0.8 and found.p < ALPHA
             words.append(f"{start}: {name} ahead of ALL in {found}")
             marks.append(Mark(f"{start}, {name}", found.interval, held[name, start]))
+    conditions = {
+        f"it is {name} from {start} initial weights": h for (name, start), h in held.items()
+    }
     return Finding(
         all(held["plain ET", start] for start in STARTS),
-        _et_conditions(held),
+        conditions,
         tuple(words),
         forest=Forest("share of seeds", 0.8, 1.0, tuple(marks), 46 / 50),
     )
-
-
-def _et_conditions(held: dict[tuple[str, str], bool]) -> dict[str, bool]:
-    return {f"it is {name} from {start} initial weights": holds
-            for (name, start), holds in held.items()}  # fmt: skip
 
 
 def _judge_back_propagation(results: Results) -> Finding:
@@ -179,7 +178,7 @@ def _judge_back_propagation(results: Results) -> Finding:
         "what the hidden layer is worth: "
         + "; ".join(f"{name} {mean(networks[name]):,.0f} bins" for name in smaller)
     )
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 _PROTOCOL = (
@@ -275,10 +274,7 @@ def _points(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) ->
         axes.plot(x, scores, mark, ms=2.8, color=colour, alpha=0.55, mew=0)
         centre = mean(scores)
         axes.hlines(median(scores).value, place - 0.3, place + 0.3, color=INK, lw=1.6)
-        axes.errorbar(
-            place + 0.36, centre.value, [[centre.value - centre.low], [centre.high - centre.value]],
-            fmt="D", ms=4, color=INK, mfc="white", lw=1.2,
-        )  # fmt: skip
+        error_bars(axes, place + 0.36, centre, fmt="D", ms=4, color=INK, mfc="white", lw=1.2)
     axes.set_xticks(
         range(len(values)), [name.replace(", ", "\n").replace("ulated", ".") for name in values]
     )
@@ -307,10 +303,7 @@ def _ratios(axes: Axes, values: dict[str, tuple[NDArray[Any], NDArray[Any]]]) ->
         axes.plot(x[ahead], ratio[ahead], "^", ms=3, color=BLUE, alpha=0.6, mew=0)
         axes.plot(x[~ahead], ratio[~ahead], "v", ms=3, color=RED, alpha=0.6, mew=0)
         centre = np.exp(mean(np.log(ratio)))
-        axes.errorbar(
-            place + 0.33, centre[0], [[centre[0] - centre[1]], [centre[2] - centre[0]]],
-            fmt="D", ms=4, color=INK, mfc="white", lw=1.2,
-        )  # fmt: skip
+        error_bars(axes, place + 0.33, centre, fmt="D", ms=4, color=INK, mfc="white", lw=1.2)
         axes.annotate(
             f"{found.wins}/{found.pairs}", (place, 0.99), xycoords=("data", "axes fraction"),
             ha="center", va="top", fontsize=7,

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from agents.evaluation import answers
 from agents.experiments.design import Axis, Block, Experiment, Variable
+from agents.experiments.markdown import markdown_table
 from agents.experiments.training import make_agent, refuse_unknown
 from agents.experiments.tuning import chosen_settings, entries, feedback_of, for_trials
 from agents.training.many import train_many
@@ -115,16 +116,10 @@ def _without_a_neuron(train: Trials, test: Trials) -> list[Row]:
     commonest = int(np.bincount(train.labels).argmax())
 
     def row(name: str, count: int) -> Row:
-        error = np.abs(test.labels - count)
-        return Row(
-            name, "", (float(np.mean(error == 0)),), float(error.mean()), _share(train, count)
-        )
+        error, right = np.abs(test.labels - count), float(np.mean(train.labels == count))
+        return Row(name, "", (float(np.mean(error == 0)),), float(error.mean()), right)
 
     return [row("silence", 0), row(f"always {commonest}, the commonest label", commonest)]
-
-
-def _share(trials: Trials, count: int) -> float:
-    return float(np.mean(trials.labels == count))
 
 
 # --- experiments ---------------------------------------------------------------------------------
@@ -164,10 +159,9 @@ def on_trials(
         agents = [make_agent(setting, train) for setting in block.settings]
         train_many(agents, train, trials=epochs * len(train), seed=seed, threads=1)
         result = answers(agents, test)
-        return {
-            "exact": (1.0 - result.wrong / len(test)).reshape(block.shape),
-            "mean_error": (result.absolute / len(test)).reshape(block.shape),
-        }
+        return block.shaped(
+            exact=1.0 - result.wrong / len(test), mean_error=result.absolute / len(test)
+        )
 
     variables = (
         Variable("exact", "float64", "1", "share of held-out trials counted exactly"),
@@ -190,16 +184,13 @@ def _digest(trials: Trials) -> str:
 
 def markdown(rows: Sequence[Row]) -> str:
     """The table, best first; entries that these trials do not suffice for below it."""
-    lines = [
-        "| told | learner | held-out trials counted exactly | mean error | in training |",
-        "| --- | --- | ---: | ---: | ---: |",
+    head = ("told", "learner", "held-out trials counted exactly", "mean error", "in training")
+    numbers = [
+        (r.told, r.name, _spread(np.array(r.exact)), f"{r.mean_error:.2f}", f"{r.training:.1%}")
+        for r in rows
+        if r.exact
     ]
-    for row in rows:
-        if row.exact:
-            lines.append(
-                f"| {row.told} | {row.name} | {_spread(np.array(row.exact))} "
-                f"| {row.mean_error:.2f} | {row.training:.1%} |"
-            )
+    lines = markdown_table(head, numbers, right=2)
     refused: dict[str, list[str]] = {}
     for row in rows:
         if row.refused:

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Block, Experiment, Setting
+from agents.experiments.markdown import in_brackets, markdown_table
 from agents.experiments.rules import LEARNERS
 from agents.experiments.statistics import (
     Interval,
     Wins,
+    counted,
     improvements,
     mean,
     middle_means,
@@ -238,8 +240,8 @@ def score_table(table: Table) -> str:
     counts = sorted({classes for by_classes in table.values() for classes in by_classes})
     head = ["told", "learner", "seeds"]
     for classes in counts:
-        head += [_plural(classes), "mistakes"]
-    lines = [_row(head), _row(["---"] * 3 + ["---:"] * (len(head) - 3))]
+        head += [counted(classes), "mistakes"]
+    rows = []
     for name in _by_feedback(table):
         by_classes = table[name]
         numbers = [len(by_classes[c].seeds) for c in counts if c in by_classes]
@@ -247,42 +249,29 @@ def score_table(table: Table) -> str:
         cells = [_told(name), name, str(numbers[0]) if same else ", ".join(map(str, numbers))]
         for classes in counts:
             cells += _cells(by_classes.get(classes))
-        lines.append(_row(cells))
-    return "\n".join(lines)
+        rows.append(cells)
+    return "\n".join(markdown_table(head, rows, right=3))
 
 
 def _cells(scores: Scores | None) -> list[str]:
     if scores is None:
         return ["", ""]
     iqm = stratified_bootstrap(middle_means, scores.bins)
-    ends = f" ({iqm.low:,.0f} … {iqm.high:,.0f})" if np.isfinite(iqm.low) else ""
     rate = np.median(scores.mistakes)
-    return [f"{iqm.value:,.0f}{ends}", f"{rate:.2g}" if np.isfinite(rate) else ""]
+    return [in_brackets(iqm, ",.0f"), f"{rate:.2g}" if np.isfinite(rate) else ""]
 
 
 def contrast_table(table: Table) -> str:
     """Paired differences, probability of improvement, and how often the first was ahead."""
     head = ["first − second", "classes", "seeds", "difference in bins", "P(improvement)", "ahead"]
-    lines = [_row(head), _row(["---"] + ["---:"] * 5)]
-    for c in contrasts(table):
-        difference = f"{c.difference.value:+,.0f} ({c.difference.low:+,.0f} … "
-        lines.append(
-            _row([
-                f"{c.first} − {c.second}", str(c.classes), str(c.seeds),
-                f"{difference}{c.difference.high:+,.0f})",
-                f"{c.improvement.value:.2f} ({c.improvement.low:.2f} … {c.improvement.high:.2f})",
-                f"{c.wins.wins} of {c.wins.pairs}",
-            ])
-        )  # fmt: skip
-    return "\n".join(lines)
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _plural(classes: int) -> str:
-    return f"{classes} class{'es' if classes > 1 else ''}"
+    rows = [
+        (
+            f"{c.first} − {c.second}", c.classes, c.seeds, in_brackets(c.difference, "+,.0f"),
+            in_brackets(c.improvement, ".2f"), f"{c.wins.wins} of {c.wins.pairs}",
+        )
+        for c in contrasts(table)
+    ]  # fmt: skip
+    return "\n".join(markdown_table(head, rows, right=1))
 
 
 FEEDBACK = {
@@ -346,7 +335,7 @@ def draw_ranking(table: Table) -> Figure:
         row[0].set_title(f"{feedback}: told {FEEDBACK[feedback]}", loc="left", fontsize=8)
     for axis, classes in zip(axes[0], counts, strict=True):
         axis.annotate(
-            _plural(classes), (0.5, 1.0), (0, 20), xycoords="axes fraction",
+            counted(classes), (0.5, 1.0), (0, 20), xycoords="axes fraction",
             textcoords="offset points", ha="center", fontweight="bold",
         )  # fmt: skip
     figure.supxlabel("bins survived, interquartile mean", fontsize=8)
@@ -429,7 +418,7 @@ def draw_front(table: Table) -> Figure:
     axis.axhline(Task().silent_score, color=GREY, ls=":", lw=0.9, zorder=0)
     axis.annotate("never spikes", (0.005, Task().silent_score + 90), fontsize=7, color=GREY,
                   xycoords=("axes fraction", "data"))  # fmt: skip
-    axis.set_xticks(range(len(counts)), [_plural(classes) for classes in counts])
+    axis.set_xticks(range(len(counts)), [counted(classes) for classes in counts])
     axis.set_xlim(-0.35, len(counts) - 0.65)
     axis.set(ylim=(0, 10_200), ylabel="bins without a mistake, of 10,000")
     axis.grid(axis="y", color="0.92", lw=0.6)

@@ -12,12 +12,12 @@ from agents import bootstrap_interval
 from agents.chemistry import Course, ReactionNetwork, Reactor
 from agents.chemistry.mistakes import Mistakes, count_mistakes
 from agents.chemistry.reactor import POINTS_PER_BIN
-from agents.continuous import InputSpikes, ReactingGNM
+from agents.continuous import InputSpikes
 from agents.continuous.outputs import in_presentations, outputs_alone
-from agents.experiments.continuous_time import CLASSES, first_stored, threshold_line, trained
+from agents.experiments.continuous_time import CLASSES, first_stored, threshold_line
 from agents.experiments.design import Block, Coordinate, Experiment, Variable
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, mean
+from agents.experiments.statistics import Interval, by_seed, mean, ratio_of_means
 from agents.experiments.training import (
     WEIGHTS,
     class_counts,
@@ -25,6 +25,7 @@ from agents.experiments.training import (
     pattern_seeds,
     protocol,
     stream_seeds,
+    trained,
 )
 from agents.experiments.verdict import Claim, Finding, Results
 from agents.plotting import BLUE, GREY, INK, NARROW, OKABE_ITO, WIDE, panels, shade, styled
@@ -107,25 +108,25 @@ def traced_trial(task: Task, patterns: Patterns, seed: int) -> Trial:
 
 def _react(block: Block) -> dict[str, NDArray[Any]]:
     (setting,) = block.settings
-    neuron = ReactingGNM(alpha=setting["alpha"], conversion=setting["conversion"])
-    agent, task, patterns = trained(setting, neuron)
+    task = Task(n_classes=CLASSES)
+    patterns = Patterns.draw(task, setting["pattern_seed"])
+    (agent,), _ = trained(block.settings, task, patterns)
     seed = evaluation_seed(setting["classes"], setting["pattern_seed"])
     mistakes = count_mistakes(agent, task, patterns, MOLECULES, setting["heard"], seed)
     spikes = InputSpikes.from_trial(traced_trial(task, patterns, seed))
     reactor = Reactor(ReactionNetwork.from_agent(agent))
     exact = reactor.deterministic(spikes).V
     runs = np.stack([reactor.stochastic(spikes, m, setting["runs"], seed).V for m in TRACED])
-    values = {
-        "wrong": mistakes.stochastic,
-        "wrong_deterministic": mistakes.deterministic,
-        "wrong_neuron": mistakes.neuron,
-        "deviation": np.sqrt(np.mean((runs - exact) ** 2, axis=-1)),
-        "V": runs[:, 0],
-        "V_deterministic": exact,
-        "S_alone": outputs_alone(agent, patterns),
-        "weights": agent.weights,
-    }
-    return {name: value.reshape(*block.shape, *value.shape) for name, value in values.items()}
+    return block.shaped(
+        wrong=[mistakes.stochastic],
+        wrong_deterministic=[mistakes.deterministic],
+        wrong_neuron=[mistakes.neuron],
+        deviation=[np.sqrt(np.mean((runs - exact) ** 2, axis=-1))],
+        V=[runs[:, 0]],
+        V_deterministic=[exact],
+        S_alone=[outputs_alone(agent, patterns)],
+        weights=[agent.weights],
+    )
 
 
 # --- the claim -----------------------------------------------------------------------------------
@@ -137,24 +138,21 @@ def right(results: xr.Dataset) -> xr.Dataset:
     With infinitely many molecules: of a network that is wrong by itself, the noise of few molecules
     cannot be told apart from its own mistakes.
     """
-    given = results["S_alone"].squeeze("classes").transpose("pattern_seed", "class").to_numpy()
+    given = by_seed(results["S_alone"].squeeze("classes"), "class")
     found = np.all(np.floor(given + 0.5) == Task(n_classes=CLASSES).owed, axis=1)
     return results.isel(pattern_seed=np.flatnonzero(found))
 
 
 def pooled(values: xr.DataArray, within: str, last: str) -> NDArray[Any]:
     """Values of all seeds in one row, (seeds × `within`, `last`)."""
-    ordered = values.squeeze("classes").transpose("pattern_seed", within, last).to_numpy()
+    ordered = by_seed(values.squeeze("classes"), within, last)
     return ordered.reshape(-1, ordered.shape[-1])
 
 
 def _shrinkage(results: xr.Dataset) -> list[Interval]:
     """Deviation at each number of traced molecules over that at the next larger one."""
     runs = pooled(results["deviation"].sel(traced=list(TRACED)), "run", "traced")
-    return [
-        bootstrap(lambda a, b: float(a.mean() / b.mean()), runs[:, k], runs[:, k + 1])
-        for k in range(len(TRACED) - 1)
-    ]
+    return [ratio_of_means(runs[:, k], runs[:, k + 1]) for k in range(len(TRACED) - 1)]
 
 
 def _judge(results: Results) -> Finding:

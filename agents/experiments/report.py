@@ -184,11 +184,7 @@ def write(folder: Path, size: str, out: Path) -> dict[str, Any]:
     costs = {name: summarise(folder / name) for name in results}
     told = record(results, costs, size)
     figures = [
-        {
-            "name": name,
-            "caption": told["figures"][name],
-            "source": _inline(paths["svg"]),
-        }
+        {"name": name, "caption": told["figures"][name], "source": _inline(paths["svg"])}
         for name, paths in draw(pictures(), results, out / "figures").items()
     ]
     out.mkdir(parents=True, exist_ok=True)

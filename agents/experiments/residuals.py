@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agents.experiments.design import Axis, Experiment
+from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
 from agents.experiments.heat_maps import ALPHA, CLASS_NAMES
 from agents.experiments.statistics import by_seed, score, share
-from agents.experiments.training import class_counts, pattern_seeds, training
+from agents.experiments.training import alpha_axis, class_counts, eta_axis, pattern_seeds, training
 from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
-from agents.plotting import GREY, INK, METHOD_COLOURS, RED, WIDE, letter, panels
+from agents.plotting import GREY, INK, METHOD_COLOURS, RED, WIDE, error_bars, letter, panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +39,8 @@ def more_runs(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (
         class_counts(3),
         pattern_seeds(seeds or range(SEEDS[size])),
-        Axis("eta", ETA, chunk=0, long_name="η, model choice"),
-        Axis("alpha", ALPHA["quick"], chunk=0, units="1/bin", long_name="α, decay per bin"),
+        eta_axis(ETA),
+        alpha_axis(ALPHA["quick"]),
     )
     return training("F5", "Noisy performance over α and η ≤ 0.6, three classes, many runs", axes)
 
@@ -83,6 +83,10 @@ def _judge(results: Results) -> Finding:
     on_average = by_seed(residual.median("eta") > 0)
     shares = share(clearly), share(on_average)
     runs = len(clearly)
+    marks = tuple(
+        Mark(f"{what} η ahead", found, found.below(ASKED))
+        for what, found in zip(("any", "median"), shares, strict=True)
+    )
     numbers = (
         f"{clearly.sum()} of {runs} runs have an η > 0 that is ahead by more than {AHEAD_SIGMAS:g} "
         f"standard errors: {shares[0]:.0%}; the paper's 1 of 5: {share(np.arange(5) < 1):.0%}",
@@ -93,16 +97,7 @@ def _judge(results: Results) -> Finding:
         shares[0].below(ASKED),
         {"“ahead” means ahead at the median η": shares[1].below(ASKED)},
         numbers,
-        forest=Forest(
-            "share of runs",
-            0.0,
-            ASKED,
-            (
-                Mark("any η ahead", shares[0], shares[0].below(ASKED)),
-                Mark("median η ahead", shares[1], shares[1].below(ASKED)),
-            ),
-            1 / 5,
-        ),
+        forest=Forest("share of runs", 0.0, ASKED, marks, 1 / 5),
     )
 
 
@@ -132,7 +127,7 @@ def draw_runs(results: Results) -> Figure:
     """Residuals of every run, and the share of runs that are ahead beside the paper's."""
     data = results["F5"].sel(classes=3)
     residual, _ = residuals(data)
-    rows, ahead = by_seed(residual.transpose("pattern_seed", "eta")), by_seed(clearly_ahead(data))
+    rows, ahead = by_seed(residual, "eta"), by_seed(clearly_ahead(data))
     figure, grid = panels(1, 2, width=WIDE, height=3.0, gridspec_kw={"width_ratios": (2.2, 1)})
     left, right = grid[0]
     etas = residual["eta"].to_numpy()
@@ -147,10 +142,7 @@ def draw_runs(results: Results) -> Figure:
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=3)
     letter(left, "a   every run")
     for place, (found, colour) in enumerate(((share(np.arange(5) < 1), GREY), (share(ahead), INK))):
-        right.errorbar(
-            place, found.value, [[found.value - found.low], [found.high - found.value]],
-            fmt="D", ms=5, color=colour, mfc="white", lw=1.4,
-        )  # fmt: skip
+        error_bars(right, place, found, fmt="D", ms=5, color=colour, mfc="white", lw=1.4)
     right.axhline(ASKED, color=RED, lw=0.9, ls=":")
     right.annotate("2 of 5", (1.45, ASKED), ha="right", va="bottom", fontsize=7, color=RED)
     right.set_xticks((0, 1), ("the paper\n5 runs", f"here\n{len(ahead)} runs"))
@@ -182,8 +174,7 @@ def draw_residuals(results: Results) -> Figure:
 
 def _residuals(axes: Axes, data: xr.Dataset) -> None:
     residual, error = residuals(data)
-    seeds = residual["pattern_seed"].to_numpy()
-    etas = residual["eta"].to_numpy()
+    seeds, etas = (residual[dim].to_numpy() for dim in ("pattern_seed", "eta"))
     # So that runs do not hide each other; more than five share the room of five.
     places = max(len(seeds), 5)
     apart, middle = 0.6 / places * np.diff(etas).min(), (places - 1) / 2

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import GNM, AggregateLabel, NeuronAgent, record, train_many
+from agents import GNM, AggregateLabel, NeuronAgent, record
 from agents.experiments.design import Block, Experiment, Variable
 from agents.experiments.methods import GNM_ALL, initial_weights
 from agents.experiments.reactions import GAP, traced_trial
@@ -17,11 +17,10 @@ from agents.experiments.training import (
     STARTS,
     WEIGHTS,
     class_counts,
-    make_agent,
     pattern_seeds,
     protocol,
     stream_seeds,
-    training_seed,
+    trained,
 )
 from agents.experiments.verdict import Claim, Finding, Forest, Mark, Results
 from agents.plotting import GREY, INK, shade
@@ -62,20 +61,13 @@ def three_patterns(size: str, seeds: tuple[int, ...] | None = None) -> Experimen
 
 
 def _train_and_hear(block: Block) -> dict[str, NDArray[Any]]:
-    first = block.settings[0]
-    classes, pattern_seed = first["classes"], first["pattern_seed"]
-    task = Task(n_classes=classes)
+    task, pattern_seed = Task(n_classes=CLASSES), block.settings[0]["pattern_seed"]
     patterns = Patterns.draw(task, pattern_seed)
-    neurons = [make_agent(setting, task) for setting in block.settings]
-    seed = training_seed(classes, pattern_seed)
-    train_many(neurons, task, patterns, first["trials"], seed, threads=1)
+    neurons, _ = trained(block.settings, task, patterns)
     trials = _heard(task, patterns, pattern_seed)
     counts = np.array([[_counts(neuron, trial) for trial in trials] for neuron in neurons])
-    return {
-        "given": counts[..., :-1].reshape(*block.shape, HEARD, classes),
-        "astray": counts[..., -1].reshape(*block.shape, HEARD),
-        "weights": np.array([n.weights for n in neurons]).reshape(*block.shape, -1),
-    }
+    weights = [neuron.weights for neuron in neurons]
+    return block.shaped(given=counts[..., :-1], astray=counts[..., -1], weights=weights)
 
 
 def _heard(task: Task, patterns: Patterns, pattern_seed: int) -> list[Trial]:
@@ -115,7 +107,7 @@ def _judge(results: Results) -> Finding:
         )
         marks.append(Mark(start, found, holds))
     forest = Forest("share of seeds", 0.5, 1.0, tuple(marks))
-    return Finding(all(held.values()), held, tuple(words), forest=forest)
+    return Finding.of(held, words, forest=forest)
 
 
 CLAIMS = (

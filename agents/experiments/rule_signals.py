@@ -1,57 +1,31 @@
-"""What each rule teaches: its y(t) on one trial, under the potential that it judges.
-
-y is read off the weights. Beside the channels of the trial there is one more for each bin, which
-spikes in that bin alone and weighs nothing; with a trace that lasts no longer than its spike, the
-change of its weight is λ y(t).
-"""
+"""What each rule teaches: its y(t) on one trial, under the potential that it judges."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents import learning
-from agents.model import PSPKernel
+from agents.explorer.teaching import teaching_signal
 from agents.neuron_agent import NeuronAgent
-from agents.neurons.gnm import GNM
 from agents.plotting import WIDE, class_colour, panels
 from agents.trained import pretrained
-from gnm_env.trial import Trial, draw_trial
+from gnm_env.trial import draw_trial
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RULES: dict[str, Any] = {
-    "CriticalThreshold (A)": learning.CriticalThreshold(1.0, momentum=0.0),
-    "CriticalThreshold, amount (A′)": learning.CriticalThreshold(1.0, momentum=0.0, amount=True),
-    "MPDAL (A)": learning.MPDAL(1.0, momentum=0.0),
-    "ErrorTrace (B)": learning.ErrorTrace(1.0, momentum=0.0),
-    "PeakError (B)": learning.PeakError(1.0, momentum=0.0),
-    "SurrogateGradient (B)": learning.SurrogateGradient(1.0, momentum=0.0),
-    "ReSuMe (C)": learning.ReSuMe(1.0, momentum=0.0, tau=6.0),
-    "Chronotron (C)": learning.Chronotron(1.0, momentum=0.0, tau_q=6.0),
+    "CriticalThreshold (A)": learning.CriticalThreshold(),
+    "CriticalThreshold, amount (A′)": learning.CriticalThreshold(amount=True),
+    "MPDAL (A)": learning.MPDAL(),
+    "ErrorTrace (B)": learning.ErrorTrace(),
+    "PeakError (B)": learning.PeakError(),
+    "SurrogateGradient (B)": learning.SurrogateGradient(),
+    "ReSuMe (C)": learning.ReSuMe(tau=6.0),
+    "Chronotron (C)": learning.Chronotron(tau_q=6.0),
 }
-
-
-def teaching_signal(rule: Any, neuron: GNM, weights: NDArray[np.float64], trial: Trial) -> Any:
-    """y(t), (T,), of `rule` for a neuron with these weights (N,) in `trial`."""
-    object.__setattr__(rule, "kernel", lambda model: PSPKernel(0.0))  # of this one instance
-    raster = np.concatenate([trial.dense(), np.eye(trial.n_bins, dtype=bool)], axis=1)
-    wide = Trial.from_dense(
-        raster, trial.onsets, trial.classes, ends=trial.ends, targets=trial.targets
-    )
-    agent = NeuronAgent(neuron, rule, wide.n_inputs, weight_bounds=None)
-    agent.weights = np.concatenate([weights, np.zeros(trial.n_bins)])
-    agent.begin_trial()
-    emitted = sum(agent.act(row) for row in raster.astype(np.int8))
-    info = {
-        "label": wide.label, "emitted": emitted, "onsets": wide.onsets, "ends": wide.ends,
-        "targets": wide.targets, "classes": wide.classes,
-    }  # fmt: skip
-    agent.learn(-abs(wide.label - emitted), info)
-    return agent.velocity[trial.n_inputs :]
 
 
 def draw(seed: int = 285) -> Figure:
@@ -63,9 +37,13 @@ def draw(seed: int = 285) -> Figure:
     # With some disorder, so that there is something to teach.
     disorder = np.random.default_rng(seed).normal(0.0, 0.13, trial.n_inputs)
     weights = trained.agent.weights + disorder
-    agent = NeuronAgent(neuron, learning.CriticalThreshold(), trial.n_inputs, weight_bounds=None)
-    agent.weights = weights
-    heard = agent.record(trial)
+
+    def agent(rule: Any) -> NeuronAgent:
+        made = NeuronAgent(neuron, rule, trial.n_inputs, weight_bounds=None)
+        made.weights = weights
+        return made
+
+    heard = agent(learning.CriticalThreshold()).record(trial)
     figure, axes = panels(
         1 + len(RULES), 1, width=WIDE, height=1.3 + 0.5 * len(RULES), sharex=True,
         gridspec_kw={"height_ratios": [3.2] + [1] * len(RULES)},
@@ -84,7 +62,8 @@ def draw(seed: int = 285) -> Figure:
             fontsize=7, transform=top.get_xaxis_transform(), color=class_colour(class_),
         )  # fmt: skip
     for axis, (name, rule) in zip(axes[1:, 0], RULES.items(), strict=True):
-        y = teaching_signal(rule, neuron, weights, trial)
+        y = teaching_signal(agent(rule), trial)
+        assert y is not None
         axis.axhline(0.0, color="0.8", linewidth=0.6)
         axis.vlines(np.arange(len(y)), 0.0, y, color="C0", linewidth=1.1)
         axis.set_yticks([])

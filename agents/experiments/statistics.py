@@ -78,9 +78,19 @@ def score(results: xr.Dataset, cap: int | None = None) -> xr.DataArray:
     return (survived if cap is None else survived.clip(max=cap)).mean("run")
 
 
-def by_seed(values: xr.DataArray) -> NDArray[np.float64]:
-    """The numbers with the pattern seeds as first axis."""
-    return values.transpose("pattern_seed", ...).to_numpy()
+def by_seed(values: xr.DataArray, *others: str) -> NDArray[np.float64]:
+    """The numbers with the pattern seeds as first axis, and the others in the order given."""
+    return values.transpose("pattern_seed", *(others or (...,))).to_numpy()
+
+
+def counts_of(results: xr.Dataset) -> list[int]:
+    """The numbers of classes of a store."""
+    return [int(count) for count in results["classes"].to_numpy()]
+
+
+def counted(classes: int) -> str:
+    """A number of classes in words."""
+    return f"{classes} class{'es' if classes > 1 else ''}"
 
 
 def bootstrap(
@@ -106,6 +116,16 @@ def mean(sample: ArrayLike) -> Interval:
     values = np.asarray(sample)
     ends = bootstrap_interval(values) if len(values) > 1 else (math.nan, math.nan)
     return Interval(float(values.mean()), *ends)
+
+
+def means(samples: NDArray[Any]) -> NDArray[np.float64]:
+    """The mean of each column with its interval, (columns, 3)."""
+    return np.array([mean(column) for column in samples.T])
+
+
+def ratio_of_means(above: ArrayLike, below: ArrayLike, *, least: float = 0.0) -> Interval:
+    """The mean of one sample over that of another, which counts as `least` where it is smaller."""
+    return bootstrap(lambda a, b: float(a.mean() / max(b.mean(), least)), above, below)
 
 
 def median(sample: ArrayLike) -> Interval:
@@ -192,6 +212,15 @@ def rate(mistakes: Any, survived: Any, added: float = 0.5) -> Any:
     `added` mistakes are added, so that who made none has a rate too.
     """
     return 1_000.0 * (mistakes + added) / (survived + mistakes).clip(1)
+
+
+def goodness(survived: NDArray[Any], cap: int) -> NDArray[np.float64]:
+    """−log10 of the mistakes per bin, runs (…, runs) taken together.
+
+    Half a mistake is added, so that a neuron without any has a value.
+    """
+    rates = ((survived < cap).sum(-1) + 0.5) / np.maximum(survived.sum(-1), 1)
+    return np.asarray(-np.log10(rates))
 
 
 def typical_rate(rates: xr.DataArray) -> xr.DataArray:

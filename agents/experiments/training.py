@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import noisy_performance, train_many
+from agents import History, noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Coordinate, Experiment, Setting, Variable
 from agents.experiments.models import new_agent
 from agents.registry import find_model, find_rule
@@ -63,26 +63,35 @@ def train_and_score(block: Block) -> dict[str, NDArray[Any]]:
     All of them have the same task, pattern seed, trials, runs and cap.
     """
     shared = block.settings[0]
-    classes, pattern_seed = shared["classes"], shared["pattern_seed"]
     task = task_of(shared)
-    patterns = Patterns.draw(task, pattern_seed)
-    neurons = [make_agent(setting, task) for setting in block.settings]
-    history = train_many(
-        neurons, task, patterns, shared["trials"], training_seed(classes, pattern_seed), threads=1,
-        block=min(LAST_TRIALS, shared["trials"]),
-    )  # fmt: skip
-    survived = noisy_performance(
-        neurons, task, patterns, shared["runs"], shared["cap"],
-        evaluation_seed(classes, pattern_seed), threads=1,
-    )  # fmt: skip
-    values = {
-        "survived": survived.reshape(*block.shape, -1),
-        "error_rate": history.error_rate[-1].reshape(block.shape),
-    }
+    patterns = Patterns.draw(task, shared["pattern_seed"])
+    neurons, history = trained(block.settings, task, patterns)
+    survived = scored(neurons, task, patterns, shared)
+    values = {"survived": survived, "error_rate": history.error_rate[-1]}
     weights = [getattr(neuron, "weights", np.full(task.n_inputs, np.nan)) for neuron in neurons]
     if len({np.shape(one) for one in weights}) == 1:  # networks of several sizes fit no array
-        values["weights"] = np.reshape(weights, (*block.shape, -1))
-    return values
+        values["weights"] = np.array(weights)
+    return block.shaped(**values)
+
+
+def trained(
+    settings: Sequence[Setting], task: Task, patterns: Patterns
+) -> tuple[list[Any], History]:
+    """Agents of these settings, trained side by side on the stream of their pattern seed."""
+    shared = settings[0]
+    agents = [make_agent(setting, task) for setting in settings]
+    seed = training_seed(task.n_classes, shared["pattern_seed"])
+    block = min(LAST_TRIALS, shared["trials"])
+    history = train_many(agents, task, patterns, shared["trials"], seed, threads=1, block=block)
+    return agents, history
+
+
+def scored(
+    agents: Sequence[Any], task: Task, patterns: Patterns, shared: Setting
+) -> NDArray[np.int64]:
+    """Bins survived, (agents, runs), on the streams of the pattern seed; runs and cap as given."""
+    seed = evaluation_seed(task.n_classes, shared["pattern_seed"])
+    return noisy_performance(agents, task, patterns, shared["runs"], shared["cap"], seed, threads=1)
 
 
 def make_agent(setting: Setting, task: Task | Trials) -> Any:
@@ -246,8 +255,17 @@ def class_counts(*counts: int) -> Axis:
 
 def learners(rows: Mapping[str, Mapping[str, Any]]) -> Axis:
     """An axis of named combinations of neuron and rule, all in one block."""
-    names, settings = tuple(rows), tuple(rows.values())
-    return Axis("learner", names, chunk=0, settings=settings, long_name="neuron and learning rule")
+    return Axis.named("learner", rows, chunk=0, long_name="neuron and learning rule")
+
+
+def alpha_axis(values: Sequence[float]) -> Axis:
+    """The axis of α, in one block."""
+    return Axis("alpha", tuple(values), chunk=0, units="1/bin", long_name="α, decay per bin")
+
+
+def eta_axis(values: Sequence[float], chunk: int = 0) -> Axis:
+    """The axis of η."""
+    return Axis("eta", tuple(values), chunk, long_name="η, model choice")
 
 
 def protocol(task: Task, sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

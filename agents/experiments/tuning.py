@@ -216,15 +216,12 @@ def for_trials(setting: Mapping[str, Any], trials: int) -> Setting:
 def search(name: str, stage: Stage, numbers: Sequence[int] = tuple(range(TRIES))) -> Experiment:
     """One stage of the search for the settings of an entry: the tries of these `numbers`."""
     tried = tries(entries()[name])
-    settings = tuple(for_trials(tried[number], stage.trials) for number in numbers)
+    rows = {number: for_trials(tried[number], stage.trials) for number in numbers}
     # As many side by side as fill the lanes which the league needs: one set of compiled loops
     # serves both.
-    axis = Axis(
-        "try", tuple(numbers), chunk=KEPT, settings=settings,
-        long_name="number of the try; 0, the usual settings",
-    )  # fmt: skip
+    axis = Axis.named("try", rows, KEPT, "number of the try; 0, the usual settings")
     axes = (pattern_seeds(stage.seeds), class_counts(*stage.classes), axis)
-    common = {key: settings[0][key] for key in ("neuron", "rule")}
+    common = {key: tried[0][key] for key in ("neuron", "rule")}
     return training(f"TUNING {name}", "Tries of one entry", axes, trials=stage.trials, **common)
 
 

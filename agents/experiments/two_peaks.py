@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from agents import GNM, AggregateLabel, NeuronAgent, record
-from agents.experiments.design import Axis, Experiment
+from agents.experiments.design import Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import bootstrap, by_seed, mean, score
-from agents.experiments.training import class_counts, pattern_seeds, training
+from agents.experiments.statistics import bootstrap, by_seed, means, score
+from agents.experiments.training import alpha_axis, class_counts, pattern_seeds, training
 from agents.experiments.verdict import Results
 from agents.plotting import (
     BINS,
@@ -31,6 +31,7 @@ from agents.plotting import (
     METHOD_MARKS,
     RED,
     WIDE,
+    band,
     letter,
     panels,
 )
@@ -54,11 +55,7 @@ ALPHA = tuple(round(0.3 + 0.025 * k, 3) for k in range(21))
 
 def column(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """The middle of the map's column at η = 0, for many pattern seeds."""
-    axes = (
-        class_counts(1),
-        pattern_seeds(seeds or SEEDS[size]),
-        Axis("alpha", ALPHA, chunk=0, units="1/bin", long_name="α, decay per bin"),
-    )
+    axes = (class_counts(1), pattern_seeds(seeds or SEEDS[size]), alpha_axis(ALPHA))
     title = "Noisy performance over α at η = 0, one class, many runs"
     return training("PEAKS", title, axes, keep_weights=True, eta=0.0)
 
@@ -116,7 +113,7 @@ def deepest(scores: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _scores(data: xr.Dataset) -> NDArray[np.float64]:
-    return by_seed(score(data).sel(classes=1).transpose("pattern_seed", "alpha"))
+    return by_seed(score(data).sel(classes=1), "alpha")
 
 
 # --- the figure ----------------------------------------------------------------------------------
@@ -177,10 +174,7 @@ def _draw_cost(axes: Axes, data: xr.Dataset) -> None:
 
 
 def _draw_average(axes: Axes, data: xr.Dataset) -> None:
-    found = np.array([mean(values) for values in _scores(data).T])
-    alphas = data["alpha"].to_numpy()
-    axes.fill_between(alphas, found[:, 1], found[:, 2], color=RED, alpha=0.2, lw=0)
-    axes.plot(alphas, found[:, 0], "o-", color=RED, ms=2.5, lw=1.6)
+    band(axes, data["alpha"].to_numpy(), means(_scores(data)), "o-", color=RED, ms=2.5, lw=1.6)
     axes.set(xlabel=_ALPHA_LABEL, ylabel=BINS, ylim=(0, 10_000))
     letter(axes, f"d   mean of {data.sizes['pattern_seed']} seeds, η = 0")
 
@@ -217,5 +211,5 @@ PICTURES = {
         "the threshold (dashed) though one spike is owed. (c) Scores by the height of the second "
         "peak, many pattern seeds at η = 0. (d) Their mean with 95 % intervals over pattern seeds.",
         _note,
-    ),
+    )
 }

@@ -5,9 +5,9 @@ Rules are fixed before the runs that they judge, and a verdict follows from the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from agents.experiments.statistics import Interval
 from agents.experiments.training import STARTS
@@ -69,6 +69,21 @@ class Finding:
     judged: bool = True
     forest: Forest | None = None
 
+    @classmethod
+    def of(
+        cls,
+        held: Mapping[Any, bool],
+        numbers: Iterable[str],
+        named: str = "{}",
+        forest: Forest | None = None,
+    ) -> Finding:
+        """What holds if each of `held` does, which are its conditions; `named` puts them in words.
+
+        Such as "the task has {} classes".
+        """
+        conditions = {named.format(name): holds for name, holds in held.items()}
+        return cls(all(held.values()), conditions, tuple(numbers), forest=forest)
+
     @property
     def verdict(self) -> str:
         """Reproduced, reproduced if …, not reproduced, or missing."""
@@ -84,8 +99,19 @@ class Finding:
         return f"{yes} if {', or '.join(kept)}" if kept else no
 
 
+class Judged:
+    """What is judged by a rule, from the stores that the rule reads."""
+
+    needs: tuple[str, ...]
+    judge: Callable[[Results], Finding]
+
+    def finding(self, results: Results) -> Finding | None:
+        """What the rule finds; None if a store that it needs is not there."""
+        return self.judge(results) if all(name in results for name in self.needs) else None
+
+
 @dataclass(frozen=True)
-class Claim:
+class Claim(Judged):
     """One row of the report.
 
     Attributes:
@@ -108,13 +134,9 @@ class Claim:
     environment: str
     judge: Callable[[Results], Finding]
 
-    def finding(self, results: Results) -> Finding | None:
-        """What the rule finds; None if a store that it needs is not there."""
-        return self.judge(results) if all(name in results for name in self.needs) else None
-
 
 @dataclass(frozen=True)
-class Hypothesis:
+class Hypothesis(Judged):
     """What we expect beyond the paper, written down with its rule before the run.
 
     Attributes:
@@ -134,10 +156,6 @@ class Hypothesis:
     rule: str
     needs: tuple[str, ...]
     judge: Callable[[Results], Finding]
-
-    def finding(self, results: Results) -> Finding | None:
-        """What the rule finds; None if a store that it needs is not there."""
-        return self.judge(results) if all(name in results for name in self.needs) else None
 
     def verdict(self, results: Results) -> str:
         """Holds, holds if …, does not hold, or missing."""

@@ -18,22 +18,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import noisy_performance, train_many
 from agents.experiments.design import Axis, Block, Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
+from agents.experiments.statistics import Interval, by_seed, mean, ratio_of_means, score
 from agents.experiments.training import (
     RUN,
     SURVIVED,
-    evaluation_seed,
     learners,
-    make_agent,
     pattern_seeds,
     protocol,
-    training_seed,
+    scored,
+    trained,
 )
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, letter, panels
+from agents.plotting import BINS, BLUE, GREY, INK, RED, WIDE, legend_above, letter, panels
 from gnm_env import Patterns, Task
 
 if TYPE_CHECKING:
@@ -146,11 +144,10 @@ SIZES = {"quick": range(100, 102), "paper": range(100, 116)}
 def when(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     """Every neuron and rule in every situation, on the same streams."""
     axes = (
-        Axis("situation", tuple(SITUATIONS), settings=tuple(SITUATIONS.values()),
-             long_name="what makes the task harder"),
+        Axis.named("situation", SITUATIONS, long_name="what makes the task harder"),
         pattern_seeds(seeds or SIZES[size]),
         learners(LEARNERS),
-    )  # fmt: skip
+    )
     common = {**RUN, "trials": TRIALS, "start": "matched"}
     described = protocol(Task(), list(LEARNERS.values())) | {
         "owed": "1 by the wanted pattern, 0 by the second",
@@ -164,16 +161,9 @@ def when(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 
 def _compute(block: Block) -> dict[str, NDArray[Any]]:
     shared = block.settings[0]
-    seed, task = shared["pattern_seed"], task_of(shared)
-    patterns = patterns_of(shared, seed)
-    agents = [make_agent(setting, task) for setting in block.settings]
-    stream = training_seed(task.n_classes, seed)
-    train_many(agents, task, patterns, shared["trials"], stream, threads=1)
-    survived = noisy_performance(
-        agents, task, patterns, shared["runs"], shared["cap"],
-        evaluation_seed(task.n_classes, seed), threads=1,
-    )  # fmt: skip
-    return {"survived": survived.reshape(*block.shape, -1)}
+    task, patterns = task_of(shared), patterns_of(shared, shared["pattern_seed"])
+    agents, _ = trained(block.settings, task, patterns)
+    return block.shaped(survived=scored(agents, task, patterns, shared))
 
 
 # --- the hypotheses ------------------------------------------------------------------------------
@@ -189,8 +179,7 @@ def scores_of(data: xr.Dataset, situation: str, learner: str) -> NDArray[np.floa
 
 def kept(data: xr.Dataset, learner: str, situation: str, base: str) -> Interval:
     """Mean score in a situation over that in another, bootstrap over seeds."""
-    pair = (scores_of(data, one, learner) for one in (situation, base))
-    return bootstrap(lambda hard, easy: float(hard.mean() / easy.mean()), *pair)
+    return ratio_of_means(*(scores_of(data, one, learner) for one in (situation, base)))
 
 
 def _judge_backwards(results: Results) -> Finding:
@@ -203,7 +192,7 @@ def _judge_backwards(results: Results) -> Finding:
             good = found.below(NEAR_SILENCE * silent) if fails else found.above(5 * silent)
             held[f"it is {neuron} under {rule}"] = good
             words.append(f"{neuron}, {rule}: {found:,.0f}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_jitter(results: Results) -> Finding:
@@ -216,7 +205,7 @@ def _judge_jitter(results: Results) -> Finding:
         )
         held[f"the rule is {rule}"] = without.below(0.2) and with_.above(0.5)
         words.append(f"{rule}: no memory keeps {without:.0%}, GNM with α 0.15 {with_:.0%}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_rise(results: Results) -> Finding:
@@ -230,7 +219,7 @@ def _judge_rise(results: Results) -> Finding:
             gain = mean(other - base)
             held[f"it is {neuron} under {rule}"] = gain.above(0)
             words.append(f"{neuron} {mean(other):,.0f}, {gain:+,.0f}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_deletion(results: Results) -> Finding:
@@ -241,7 +230,7 @@ def _judge_deletion(results: Results) -> Finding:
             share = kept(data, f"{neuron}, {rule}", "deletion 20 %", PLAIN)
             held[f"it is {neuron} under {rule}"] = share.below(0.5)
             words.append(f"{neuron}, {rule}: {share:.0%}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 def _judge_overlap(results: Results) -> Finding:
@@ -256,7 +245,7 @@ def _judge_overlap(results: Results) -> Finding:
             f"{rule}: no memory at 80 % {found:,.0f} bins (silent {silent:,.0f}); GNM with α 0.15 "
             f"keeps {share:.0%} at 90 %"
         )
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words)
 
 
 _PROTOCOL = (
@@ -360,9 +349,7 @@ def _draw(results: Results) -> Figure:
             if row == 0:
                 letter(axes, f"{'abc'[column]}   {family}")
         grid[row, 0].set_ylabel(f"{rule}\n{BINS}")
-    figure.legend(
-        *grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=6, fontsize=7
-    )
+    legend_above(figure, grid[0, 0], 6)
     return figure
 
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from agents.experiments.design import Axis, Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import RESAMPLES, Interval, wins
+from agents.experiments.methods import initial_weights
+from agents.experiments.statistics import RESAMPLES, Interval, bootstrap, by_seed, goodness, wins
 from agents.experiments.training import STARTS, class_counts, pattern_seeds, training
 from agents.experiments.verdict import Finding, Hypothesis, Results
 from agents.plotting import BLUE, GREY, INK, WIDE, letter
@@ -60,10 +61,10 @@ def factors(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
     axes = (
         class_counts(2),
         pattern_seeds(seeds or SIZES[size]),
-        Axis("model", tuple(NEURONS), 0, tuple(NEURONS.values()), long_name="neuron"),
-        Axis("method", tuple(METHODS), 0, tuple(METHODS.values()), long_name="rule and rate"),
-        Axis("start", STARTS, chunk=0, long_name="initial weights"),
-        Axis("weights", tuple(BOUNDS), 0, tuple(BOUNDS.values()), long_name="weight bounds"),
+        Axis.named("model", NEURONS, chunk=0, long_name="neuron"),
+        Axis.named("method", METHODS, chunk=0, long_name="rule and rate"),
+        initial_weights(),
+        Axis.named("weights", BOUNDS, chunk=0, long_name="weight bounds"),
     )
     return training("FACTORS", "Neuron, rule, rate, initial weights and bounds, crossed", axes)
 
@@ -78,18 +79,13 @@ class Effect(NamedTuple):
     share: Interval
 
 
-def goodness(data: xr.Dataset) -> NDArray[np.float64]:
-    """−log10 of the mistakes per bin, by (seed, neuron, rule, λ, start, weights).
-
-    Half a mistake is added, so that a neuron without any has a value.
-    """
-    cap = data.attrs["settings"]["common"]["cap"]
-    order = ("pattern_seed", "model", "method", "start", "weights", "run")
-    bins = data["survived"].squeeze("classes", drop=True).transpose(*order).to_numpy()
-    rate = ((bins < cap).sum(-1) + 0.5) / np.maximum(bins.sum(-1), 1)
-    seeds, models, _, *rest = rate.shape
-    values: NDArray[np.float64] = -np.log10(rate)
-    return values.reshape(seeds, models, len(RULES), len(RATES), *rest)
+def goodness_of(data: xr.Dataset) -> NDArray[np.float64]:
+    """−log10 of the mistakes per bin, by (seed, neuron, rule, λ, start, weights)."""
+    bins = by_seed(
+        data["survived"].squeeze("classes", drop=True), "model", "method", "start", "weights", "run"
+    )
+    values = goodness(bins, data.attrs["settings"]["common"]["cap"])
+    return values.reshape(*values.shape[:2], len(RULES), len(RATES), *values.shape[3:])
 
 
 def shares(values: NDArray[np.float64]) -> dict[str, float]:
@@ -129,7 +125,7 @@ def shares(values: NDArray[np.float64]) -> dict[str, float]:
 
 def effects(data: xr.Dataset, resamples: int = RESAMPLES // 4) -> list[Effect]:
     """Every share with its 95 % bootstrap interval over seeds, largest first."""
-    values = goodness(data)
+    values = goodness_of(data)
     rng = np.random.default_rng(0)
     again = [
         shares(values[rng.integers(0, len(values), len(values))]) for _ in range(resamples)
@@ -166,7 +162,7 @@ class Ranking(NamedTuple):
 
 def ranking(data: xr.Dataset, neuron: str) -> Ranking:
     """The standing of `neuron` beside the GNM."""
-    values = goodness(data)
+    values = goodness_of(data)
     names = list(NEURONS)
     gnm, other = values[:, names.index("GNM")], values[:, names.index(neuron)]
     rows = len(METHODS)
@@ -182,17 +178,14 @@ def ranking(data: xr.Dataset, neuron: str) -> Ranking:
 
 
 def _judge_shares(results: Results) -> Finding:
-    values = goodness(results["FACTORS"])
+    values = goodness_of(results["FACTORS"])
     found = {effect.name: effect.share for effect in effects(results["FACTORS"])}
 
     def gap(sample: NDArray[np.float64]) -> float:
         of = shares(sample)
         return of["rule"] - of["neuron"]
 
-    rng = np.random.default_rng(0)
-    draws = rng.integers(0, len(values), (RESAMPLES // 4, len(values)))
-    low, high = np.percentile([gap(values[draw]) for draw in draws], (2.5, 97.5))
-    more = Interval(gap(values), float(low), float(high))
+    more = bootstrap(gap, values, resamples=RESAMPLES // 4)
     held = more.above(0.0)
     return Finding(
         held and found["neuron"].below(0.1),
@@ -218,8 +211,7 @@ def _judge_reversals(results: Results) -> Finding:
             f"{neuron} below the GNM in {found.as_in_the_paper} of {cells} cells, above it in "
             f"{found.reversed}, not told apart in {cells - found.as_in_the_paper - found.reversed}"
         )
-    conditions = {f"the other neuron is the {name}": holds for name, holds in held.items()}
-    return Finding(all(held.values()), conditions, tuple(words))
+    return Finding.of(held, words, "the other neuron is the {}")
 
 
 def _judge_own_cell(results: Results) -> Finding:
@@ -230,8 +222,7 @@ def _judge_own_cell(results: Results) -> Finding:
         times = 10 ** found.difference[row, column]
         held[neuron] = bool(found.sure[row, column] and times > 1)
         words.append(f"{neuron} errs {times:.2f} times as often as the GNM")
-    conditions = {f"the other neuron is the {name}": holds for name, holds in held.items()}
-    return Finding(all(held.values()), conditions, tuple(words))
+    return Finding.of(held, words, "the other neuron is the {}")
 
 
 _PROTOCOL = (

@@ -9,13 +9,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
-import types
 import typing
 from collections.abc import Callable
 from typing import Any
 
 from agents import registry
-from agents.commands.fields import field_help
+from agents.commands.fields import field_help, without_none
 from agents.experiments.models import default_rule, new_agent
 from gnm_env import Task
 from gnm_env.colours import CLASS_COLOURS, as_hex
@@ -115,10 +114,7 @@ def _symbol(text: str) -> str:
 
 def _kind(hint: Any, text: str) -> dict[str, Any] | None:
     """How the page sets a value of this type; None if it cannot."""
-    optional = isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union
-    if optional:
-        kinds = [kind for kind in typing.get_args(hint) if kind is not types.NoneType]
-        hint = kinds[0] if len(kinds) == 1 else None
+    hint, optional = without_none(hint)
     if typing.get_origin(hint) is typing.Literal:
         return {"kind": "choice", "options": list(typing.get_args(hint))}
     if typing.get_origin(hint) is tuple:

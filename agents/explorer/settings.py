@@ -7,13 +7,13 @@ The fields of the neuron are called n.…, those of the rule r.…, those of the
 from __future__ import annotations
 
 import dataclasses
-import types
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from agents import registry
+from agents.commands.fields import without_none
 from agents.experiments.models import default_rule, new_agent
 from gnm_env import Patterns, Task
 from gnm_env.checks import MAX_SEED
@@ -99,12 +99,9 @@ def _field_value(cls: Any, key: str, name: str, text: str) -> Any:
     hints = typing.get_type_hints(cls)
     if name not in {field.name for field in dataclasses.fields(cls)}:
         raise ValueError(f"{cls.__name__} has no field {name!r}, got the setting {key}")
-    hint = hints[name]
-    kinds = [kind for kind in typing.get_args(hint) if kind is not types.NoneType]
-    if len(kinds) < len(typing.get_args(hint)):  # it may be None
-        if text == NONE:
-            return None
-        hint = kinds[0] if len(kinds) == 1 else hint
+    hint, optional = without_none(hints[name])
+    if optional and text == NONE:
+        return None
     if typing.get_origin(hint) is tuple:
         kind = typing.get_args(hint)[0]
         return tuple(_as(kind, key, word) for word in text.replace(",", " ").split())

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents import GNM, AggregateLabel, train_many
+from agents import train_many
 from benchmarks.rows import Findings, Row, Target, rate_rows
 from benchmarks.timing import Settings, Subject, race
-from benchmarks.training import BINS, LANES, bins, neurons
+from benchmarks.training import LANES, bins, neurons
 from gnm_env import Patterns, Task, Trials
 
 SECTION = f"Recorded trials, {LANES} neurons"
@@ -32,13 +29,12 @@ def data_sets(settings: Settings) -> Findings:
     patterns = Patterns.draw(task, 0)
     recorded = Trials.draw(task, patterns, settings.trials, seed=settings.seed)
     drawn, heard = "drawn on the way", "recorded, in memory"
-    make = functools.partial(neurons, GNM(), AggregateLabel(), LANES)
     subjects = [
         Subject(
             drawn,
             lambda agents: train_many(agents, task, patterns, settings.trials, settings.seed, 1),
             LANES * bins(task, settings.trials, settings.seed),
-            make,
+            neurons,
         ),
         Subject(
             heard,
@@ -46,31 +42,26 @@ def data_sets(settings: Settings) -> Findings:
                 agents, recorded, trials=settings.trials, seed=settings.seed, threads=1
             ),
             LANES * float(recorded.n_bins.sum()),
-            make,
+            neurons,
         ),
     ]
-    rows = rate_rows(
-        SECTION,
-        race(subjects, settings),
-        BINS,
-        1e-6,
-        against=drawn,
-        targets={heard: (Target(0.7, "ratio"),)},
-    )
+    targets = {heard: (Target(0.7, "ratio"),)}
+    rows = rate_rows(SECTION, race(subjects, settings), against=drawn, targets=targets)
     return Findings(rows=[*rows, _from_file(task, patterns, settings), _size(task, patterns)])
 
 
 def _from_file(task: Task, patterns: Patterns, settings: Settings) -> Row:
     """Seconds from a file to neurons that have heard all of it once."""
-    with _recording(task, patterns, settings.seed) as file:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "trials.npz"
+        Trials.draw(task, patterns, RECORDED, seed=settings.seed).save(file)
 
         def run(agents: list[Any]) -> None:
             trials = Trials.load(file)
             train_many(agents, trials, trials=len(trials), seed=settings.seed, threads=1)
 
-        make = functools.partial(neurons, GNM(), AggregateLabel(), LANES)
         name = f"{RECORDED:,} trials, from the file to the last weight"
-        timing = race([Subject(name, run, 1.0, make)], settings)[name]
+        timing = race([Subject(name, run, 1.0, neurons)], settings)[name]
     return Row(
         SECTION,
         name,
@@ -81,14 +72,6 @@ def _from_file(task: Task, patterns: Patterns, settings: Settings) -> Row:
         cpu_share=timing.cpu_share,
         note=f"{task.n_inputs} channels, 200 bins on average; each trial heard once",
     )
-
-
-@contextmanager
-def _recording(task: Task, patterns: Patterns, seed: int) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "trials.npz"
-        Trials.draw(task, patterns, RECORDED, seed=seed).save(file)
-        yield file
 
 
 def _size(task: Task, patterns: Patterns) -> Row:

@@ -63,27 +63,21 @@ def single(settings: Settings) -> Findings:
     """Steps of one environment through `gymnasium.make`, by a loop that sends plain ints."""
     steps = 20_000 if settings.quick else 100_000
     pairs = (("benchmarks/TrialRows-v0", TRIAL), ("benchmarks/StreamRows-v0", STREAM))
-    ids = [id for pair in pairs for id in pair]
-    names = dict(
-        zip(ids, ("rows, 200 a trial", TRIAL, "rows, 148 an episode", STREAM), strict=True)
-    )
-    subjects = [_single(names[id], gym.make(id), steps) for id in ids]
-    subjects.append(_single("CartPole-v1", gym.make("CartPole-v1"), steps))
+    names = {
+        pairs[0][0]: "rows, 200 a trial", TRIAL: TRIAL, pairs[1][0]: "rows, 148 an episode",
+        STREAM: STREAM, "CartPole-v1": "CartPole-v1",
+    }  # fmt: skip
+    subjects = [_single(name, gym.make(id), steps) for id, name in names.items()]
     timings = race(subjects, settings)
-    found = Findings()
+    section, found = "One environment", Findings()
     for bare, ours in pairs:
         pair = {names[id]: timings[names[id]] for id in (bare, ours)}
+        targets = {ours: [Target(0.5, of="ratio")]}
+        notes = {names[bare]: "does nothing; through the same wrappers"}
         found.rows += rate_rows(
-            "One environment",
-            pair,
-            UNIT,
-            1e-6,
-            against=names[bare],
-            targets={ours: [Target(0.5, of="ratio")]},
-            notes={names[bare]: "does nothing; through the same wrappers"},
+            section, pair, UNIT, against=names[bare], targets=targets, notes=notes
         )
-    pole = {"CartPole-v1": timings["CartPole-v1"]}
-    found.rows += rate_rows("One environment", pole, UNIT, 1e-6)
+    found.rows += rate_rows(section, {"CartPole-v1": timings["CartPole-v1"]}, UNIT)
     return found
 
 
@@ -116,22 +110,11 @@ def vector(settings: Settings) -> Findings:
         subjects.append(_many(f"{STREAM}{how}, random answers", streams, steps, random=True))
     loop = _made(TRIAL, mode="sync")
     subjects.append(_many(f"{TRIAL}, SyncVectorEnv", loop, steps // 50))
-    targets = {
-        TRIAL: [Target(1.5, of="ratio")],
-        f"{TRIAL}, copy=False": [Target(3.0, of="ratio")],
-    }
+    targets = {TRIAL: [Target(1.5, of="ratio")], f"{TRIAL}, copy=False": [Target(3.0, of="ratio")]}
     notes = {pole: "Gymnasium's own native vector environment"}
-    return Findings(
-        rows=rate_rows(
-            f"{COPIES:,} environments at once",
-            race(subjects, settings),
-            UNIT,
-            1e-6,
-            against=pole,
-            targets=targets,
-            notes=notes,
-        )
-    )
+    section, timings = f"{COPIES:,} environments at once", race(subjects, settings)
+    rows = rate_rows(section, timings, UNIT, against=pole, targets=targets, notes=notes)
+    return Findings(rows=rows)
 
 
 def _made(
@@ -142,9 +125,7 @@ def _made(
     return envs
 
 
-def staggered(
-    envs: gym.vector.VectorEnv[Any, Any, Any],
-) -> gym.vector.VectorEnv[Any, Any, Any]:
+def staggered(envs: gym.vector.VectorEnv[Any, Any, Any]) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Reset so that in each step about as many trials end as in any other.
 
     All reset at once, they would go on ending in the same few steps for some ten thousand.

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from statistics import median
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from agents import GNM, AggregateLabel
+from agents import AggregateLabel
 from benchmarks.environments import staggered
 from benchmarks.rows import Curve, Findings, Row, Target
 from benchmarks.timing import Settings, Skip, Subject, Timing, race
@@ -45,7 +45,7 @@ def sizes(settings: Settings) -> Findings:
         for size, task in by_size.items():
             # The longer the trials the fewer, so that each size does about the same work.
             n = max(round(trials * 200 / (task.background_bins + task.mean_pattern_bins)), 5)
-            make = functools.partial(neurons, GNM(), AggregateLabel(), LANES, task.n_inputs)
+            make = partial(neurons, n_inputs=task.n_inputs)
             subjects.append(learning(str(size), make, task, n, settings.seed))
         timings = race(subjects, settings)
         note = given + (
@@ -72,16 +72,7 @@ def lanes(settings: Settings) -> Findings:
     """Growth with the number of neurons side by side: to be flat."""
     trials = 500 if settings.quick else 2_000
     at = [64, 256, 1_024, 4_096]
-    subjects = [
-        learning(
-            str(n),
-            functools.partial(neurons, GNM(), AggregateLabel(), n),
-            Task(),
-            trials,
-            settings.seed,
-        )
-        for n in at
-    ]
+    subjects = [learning(str(n), partial(neurons, n=n), Task(), trials, settings.seed) for n in at]
     timings = race(subjects, settings)
     note = f"{trials:,} trials"
     return _flat(curve("neurons side by side", "neurons", at, timings, note=note, flat=True))
@@ -99,7 +90,7 @@ def trials(settings: Settings) -> Findings:
     curves = []
     cases = (("learning", AggregateLabel(), LANES), ("learning rate 0", idle_rule(), LANES // 2))
     for label, rule, n in cases:
-        make = functools.partial(neurons, GNM(), rule, n)
+        make = partial(neurons, rule=rule, n=n)
         timings = race([learning(str(k), make, Task(), k, settings.seed) for k in at], settings)
         grown = curve(f"number of trials, {label}", "trials", at, timings, note=f"{n} neurons")
         curves.append(replace(grown, label=label, flat=rule.learning_rate == 0.0))
@@ -125,11 +116,8 @@ def environments(settings: Settings) -> Findings:
     """Growth with the number of environments in one native vector environment."""
     at = [1, 4, 16, 64, 256, 1_024, 4_096]
     timings = race([_stepping(n, 200 if settings.quick else 1_000) for n in at], settings)
-    found = Findings()
-    found.curves.append(
-        curve("environments", "environments", at, timings, unit="ns per environment-step")
-    )
-    return found
+    unit = "ns per environment-step"
+    return Findings(curves=[curve("environments", "environments", at, timings, unit=unit)])
 
 
 def _stepping(n: int, steps: int) -> Subject:

@@ -29,14 +29,8 @@ def reinforcement(settings: Settings) -> Findings:
         steps = (1 if settings.quick else 3) * model.n_steps * env.num_envs
         subjects.append(Subject(name, functools.partial(_learn, model, steps), steps))
         targets[name] = (Target(bound),)
-    rows = rate_rows(
-        "Reinforcement learning, training end to end",
-        race(subjects, settings),
-        "steps/s",
-        1.0,
-        targets=targets,
-    )
-    return Findings(rows=rows)
+    section, timings = "Reinforcement learning, training end to end", race(subjects, settings)
+    return Findings(rows=rate_rows(section, timings, "steps/s", 1.0, targets=targets))
 
 
 def _learn(model: Any, steps: int, _: object) -> None:

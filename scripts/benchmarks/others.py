@@ -20,7 +20,7 @@ from agents import GNM, AggregateLabel, NeuronAgent
 from agents.training.source import TaskSource
 from benchmarks.rows import Findings, rate_rows
 from benchmarks.timing import Settings, Subject, race
-from benchmarks.training import BINS, LANES, bins, learning, neurons
+from benchmarks.training import LANES, bins, learning, neurons
 from gnm_env import Patterns, Task, Trial, draw_trial
 
 ALPHA = 0.3
@@ -154,14 +154,8 @@ def forward(settings: Settings) -> Findings:
         f"{SIDE_BY_SIDE} trials of {LISTENED.background_bins} bins side by side, and all count "
         "the same output spikes"
     }
-    found.rows += rate_rows(
-        f"Listening only, {LANES} neurons, beside other software",
-        race(subjects, settings),
-        BINS,
-        1e-6,
-        against=NUMPY,
-        notes=notes,
-    )
+    section = f"Listening only, {LANES} neurons, beside other software"
+    found.rows += rate_rows(section, race(subjects, settings), against=NUMPY, notes=notes)
     return found
 
 
@@ -184,8 +178,6 @@ def learning_trials(settings: Settings) -> Findings:
         rows += rate_rows(
             "Listening and learning (ALL), beside other software",
             race([ours, theirs], settings),
-            BINS,
-            1e-6,
             against=theirs.name,
             notes={ours.name: f"the first {trials:,} trials"},
         )

@@ -44,11 +44,8 @@ def draw(found: Findings, path: str | os.PathLike[str]) -> None:
         for k, curves in enumerate(panels_of):
             _growth(right.add_subplot(grid[1 + k // 3, k % 3]), curves)
         machine = found.machine
-        figure.suptitle(
-            f"{machine['processor']}, {machine['instructions']}; Python {machine['python']}",
-            fontsize=9,
-            color=GREY,
-        )
+        title = f"{machine['processor']}, {machine['instructions']}; Python {machine['python']}"
+        figure.suptitle(title, fontsize=9, color=GREY)
         figure.savefig(path, dpi=110)
         plt.close(figure)
 
@@ -66,15 +63,8 @@ def _targets(axes: Any, sought: Sequence[tuple[Row, Target]]) -> None:
         typical = median(reach)
         axes.barh(place, typical, height=0.72, color=COLOURS[row.reached(target)])
         axes.plot([min(reach), max(reach)], [place, place], color="black", lw=1)
-        axes.text(
-            max(reach) * 1.04,
-            place,
-            _label(row, target),
-            va="center",
-            fontsize=7.5,
-            bbox=WHITE,
-            zorder=5,
-        )
+        label = _label(row, target)
+        axes.text(max(reach) * 1.04, place, label, va="center", fontsize=7.5, bbox=WHITE, zorder=5)
     axes.axvline(1.0, color="black", lw=1.2, ls=(0, (4, 2)))
     axes.set_xscale("log")
     reaches = [_reach(row, t, v) for row, t in sought for v in _values(row, t)]
@@ -82,20 +72,14 @@ def _targets(axes: Any, sought: Sequence[tuple[Row, Target]]) -> None:
     axes.set_xlim(low / 1.2, high * (high / low) ** 0.55)
     axes.set_yticks(places, [_name(row, target) for row, target in sought])
     axes.set_ylim(max(places) + 0.7, -1.6)
-    for section in dict.fromkeys(row.section for row, _ in sought):
-        first = next(
-            p for p, (row, _) in zip(places, sought, strict=True) if row.section == section
-        )
+    first: dict[str, float] = {}
+    for place, (row, _) in zip(places, sought, strict=True):
+        first.setdefault(row.section, place)
+    for section, place in first.items():
         axes.text(
-            low / 1.15,
-            first - 0.78,
-            section,
-            fontsize=8,
-            fontweight="bold",
-            va="center",
-            bbox=WHITE,
-            zorder=4,
-        )
+            low / 1.15, place - 0.78, section, fontsize=8, fontweight="bold", va="center",
+            bbox=WHITE, zorder=4,
+        )  # fmt: skip
     axes.set_xlabel("times the target (dashed), further right is better; line: all repeats")
     axes.tick_params(axis="y", length=0)
     ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if low / 1.2 <= t <= high * 1.2]
@@ -168,10 +152,8 @@ def _growth(axes: Any, curves: Sequence[Curve]) -> None:
     for curve, colour in zip(curves, (COLOURS[MET], "#4a6fa5", GREY), strict=False):
         middle = [median(values) for values in curve.values]
         if curve.flat:
-            centre = (max(middle) + min(middle)) / 2
-            axes.axhspan(
-                0.8 * centre, 1.2 * centre, color=colour, alpha=0.13, lw=0, zorder=0, label="±20 %"
-            )
+            ends = [share * (max(middle) + min(middle)) / 2 for share in (0.8, 1.2)]
+            axes.axhspan(*ends, color=colour, alpha=0.13, lw=0, zorder=0, label="±20 %")
         spread = ([min(v) for v in curve.values], [max(v) for v in curve.values])
         axes.fill_between(curve.sizes, *spread, color=colour, alpha=0.25, lw=0)
         axes.plot(curve.sizes, middle, "o-", color=colour, ms=3.5, lw=1.3, label=curve.label or "_")

@@ -8,6 +8,7 @@ from itertools import groupby
 from statistics import median
 from typing import Any
 
+from agents.experiments.markdown import markdown_table
 from agents.experiments.progress import duration
 from agents.memory import (
     BYTES_AT_LEAST,
@@ -216,5 +217,4 @@ def _curve(curve: Curve) -> str:
 
 
 def _markdown(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    shown = [head, ["---"] * len(head), *lines]
-    return "\n".join("| " + " | ".join(line) + " |" for line in shown)
+    return "\n".join(markdown_table(head, lines, right=len(head)))

@@ -10,6 +10,7 @@ from typing import Any
 
 from benchmarks.timing import Timing
 
+BINS = "million neuron-bins/s"
 MET, BEST_ONLY, MISSED = "met", "best repeat only", "not met"
 
 
@@ -166,8 +167,8 @@ def _curve(shown: dict[str, Any]) -> Curve:
 def rate_rows(
     section: str,
     timings: Mapping[str, Timing],
-    unit: str,
-    scale: float,
+    unit: str = BINS,
+    scale: float = 1e-6,
     *,
     against: str = "",
     targets: Mapping[str, Sequence[Target]] | None = None,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from typing import Any
 
 import gymnasium as gym
@@ -44,7 +44,6 @@ from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 from gnm_env.task import task_arrays
 from gnm_env.trial import draw_next
 
-BINS = "million neuron-bins/s"
 LANES = 64
 GRID = 41
 """Values of α, and of η, in a heat map: k / 40."""
@@ -59,7 +58,10 @@ than the 1,681, so that the estimate is rather too long."""
 Make = Callable[[], list[Any]]
 
 
-@functools.cache
+_GNM, _ALL = GNM(), AggregateLabel()
+
+
+@cache
 def bins(task: Task, trials: int, seed: int) -> int:
     """Bins in the first `trials` trials of the stream of `seed`, counted."""
     return sum(trial_bins(task, trials, seed).tolist())
@@ -74,9 +76,9 @@ def trial_bins(task: Task, trials: int, seed: int) -> NDArray[np.int64]:
 
 
 def neurons(
-    neuron: Neuron,
-    rule: Rule,
-    n: int,
+    neuron: Neuron = _GNM,
+    rule: Rule = _ALL,
+    n: int = LANES,
     n_inputs: int = 100,
     bounds: tuple[float, float] | None = (0.0, 1.0),
 ) -> list[NeuronAgent]:
@@ -117,20 +119,12 @@ def side_by_side(settings: Settings) -> Findings:
         "MST, ALL": (MST(), AggregateLabel(), one, Target(300)),
     }
     subjects = [
-        learning(
-            name,
-            functools.partial(neurons, neuron, rule, LANES),
-            task,
-            settings.trials,
-            settings.seed,
-        )
+        learning(name, partial(neurons, neuron, rule), task, settings.trials, settings.seed)
         for name, (neuron, rule, task, _) in kinds.items()
     ]
     targets = {name: (target,) for name, (*_, target) in kinds.items()}
-    rows = rate_rows(
-        section, race(subjects, settings), BINS, 1e-6, against="GNM η=0, ALL", targets=targets
-    )
-    return Findings(rows=rows)
+    timings = race(subjects, settings)
+    return Findings(rows=rate_rows(section, timings, against="GNM η=0, ALL", targets=targets))
 
 
 def rules(settings: Settings) -> Findings:
@@ -154,24 +148,17 @@ def rules(settings: Settings) -> Findings:
         variant = {"surrogate": ", count", "chronotron": ", I"}.get(rule.name, "")
         name = type(rule).__name__ + (variant if type(rule).__name__ in free else "")
         free[name] = (GNM(), rule, slower)
-    makes = {
-        name: functools.partial(neurons, neuron, rule, LANES, bounds=None)
+    makes: dict[str, Make] = {
+        name: partial(neurons, neuron, rule, bounds=None)
         for name, (neuron, rule, _) in free.items()
     }
-    makes[first] = functools.partial(neurons, GNM(), AggregateLabel(), LANES)
-    makes["STDP"] = functools.partial(neurons, GNM(), STDP(), LANES)
+    makes[first] = neurons
+    makes["STDP"] = partial(neurons, rule=STDP())
     trials = settings.trials if settings.quick else TRIALS
     subjects = [learning(name, make, Task(), trials, settings.seed) for name, make in makes.items()]
     targets = {name: (target,) for name, (*_, target) in free.items()} | {"STDP": (slower,)}
-    rows = rate_rows(
-        f"Rules, {LANES} neurons on one stream",
-        race(subjects, settings),
-        BINS,
-        1e-6,
-        against=first,
-        targets=targets,
-    )
-    return Findings(rows=rows)
+    section, timings = f"Rules, {LANES} neurons on one stream", race(subjects, settings)
+    return Findings(rows=rate_rows(section, timings, against=first, targets=targets))
 
 
 def alone(settings: Settings) -> Findings:
@@ -189,18 +176,12 @@ def alone(settings: Settings) -> Findings:
         "MST, ALL": (MST(), AggregateLabel(), (fast, half_more)),
     }
     subjects = [
-        learning(
-            name,
-            functools.partial(neurons, neuron, rule, 1),
-            Task(),
-            TRIALS,
-            settings.seed,
-        )
+        learning(name, partial(neurons, neuron, rule, 1), Task(), TRIALS, settings.seed)
         for name, (neuron, rule, _) in kinds.items()
     ]
     targets = {name: target for name, (*_, target) in kinds.items()}
-    rows = rate_rows(section, race(subjects, settings), BINS, 1e-6, against=first, targets=targets)
-    return Findings(rows=rows)
+    timings = race(subjects, settings)
+    return Findings(rows=rate_rows(section, timings, against=first, targets=targets))
 
 
 NETWORKS = 32
@@ -219,9 +200,9 @@ def network(settings: Settings) -> Findings:
         return [NetworkAgent(Network(), rule, Task().n_inputs, seed=seed) for seed in range(n)]
 
     cases = {
-        "10 hidden, BP, one class": (functools.partial(make, 1), Target(6.0)),
+        "10 hidden, BP, one class": (partial(make, 1), Target(6.0)),
         f"the same, {NETWORKS} networks side by side, each": (
-            functools.partial(make, NETWORKS),
+            partial(make, NETWORKS),
             Target(0.4, aim=0.2),
         ),
     }
@@ -240,8 +221,8 @@ def continuous(settings: Settings) -> Findings:
         return [ContinuousAgent(neuron, rule, n_inputs, seed=seed) for seed in range(n)]
 
     cases: dict[str, tuple[Make, Target | None]] = {
-        "continuous GNM η=0, ALL": (functools.partial(make, 1), None),
-        f"the same, {LANES} neurons side by side, each": (functools.partial(make, LANES), None),
+        "continuous GNM η=0, ALL": (partial(make, 1), None),
+        f"the same, {LANES} neurons side by side, each": (partial(make, LANES), None),
     }
     return _per_training(settings, cases)
 
@@ -281,14 +262,8 @@ def loop(settings: Settings) -> Findings:
         bins(Task(), trials, settings.seed),
         lambda: NeuronAgent(GNM(), AggregateLabel(), Task().n_inputs),
     )
-    rows = rate_rows(
-        "Standard loop",
-        race([subject], settings),
-        "steps/s",
-        1.0,
-        targets={subject.name: (Target(150_000),)},
-    )
-    return Findings(rows=rows)
+    timings, targets = race([subject], settings), {subject.name: (Target(150_000),)}
+    return Findings(rows=rate_rows("Standard loop", timings, "steps/s", 1.0, targets=targets))
 
 
 def grid(n: int = GRID**2, seed: int = 0) -> list[NeuronAgent]:
@@ -315,15 +290,8 @@ def threads(settings: Settings) -> Findings:
         learning(one, grid, Task(), trials, settings.seed),
         learning(two, grid, Task(), trials, settings.seed, threads=2),
     ]
-    rows = rate_rows(
-        "Threads",
-        race(subjects, settings),
-        BINS,
-        1e-6,
-        against=one,
-        targets={two: (Target(1.8, "ratio"),)},
-    )
-    return Findings(rows=rows)
+    timings, targets = race(subjects, settings), {two: (Target(1.8, "ratio"),)}
+    return Findings(rows=rate_rows("Threads", timings, against=one, targets=targets))
 
 
 def heat_map(settings: Settings) -> Findings:
@@ -340,10 +308,10 @@ def heat_map(settings: Settings) -> Findings:
     for pattern_seed in seeds:
         subject = Subject(
             "heat map",
-            functools.partial(_train_and_score, TRIALS, pattern_seed, n_cores),
+            partial(_train_and_score, TRIALS, pattern_seed, n_cores),
             cells,
-            functools.partial(grid, cells, pattern_seed),
-            functools.partial(_train_and_score, 2, pattern_seed, n_cores, grid(3)),
+            partial(grid, cells, pattern_seed),
+            partial(_train_and_score, 2, pattern_seed, n_cores, grid(3)),
             n_cores,
         )
         timings.append(race([subject], once)[subject.name])
