@@ -20,11 +20,18 @@ from numpy.typing import NDArray
 from agents import noisy_performance
 from agents.experiments.design import Axis, Block, Experiment
 from agents.experiments.figures import Picture
-from agents.experiments.statistics import Interval, bootstrap, by_seed, mean, score
+from agents.experiments.statistics import Interval, by_seed, mean, ratio_of_means, score
 from agents.experiments.training import SURVIVED, evaluation_seed, pattern_seeds
 from agents.experiments.verdict import Finding, Hypothesis, Results
-from agents.experiments.when_memory import PLAIN, SITUATIONS, patterns_of, silent_score, task_of
-from agents.plotting import BINS, BLUE, GREY, INK, RED, panels
+from agents.experiments.when_memory import (
+    NEAR_SILENCE,
+    PLAIN,
+    SITUATIONS,
+    patterns_of,
+    silent_score,
+    task_of,
+)
+from agents.plotting import BINS, BLUE, GREY, INK, RED, error_bars, legend_above, panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,13 +62,12 @@ def when_rl(size: str, seeds: tuple[int, ...] | None = None) -> Experiment:
 
     axes = (
         pattern_seeds(seeds or SIZES[size]),
-        Axis(
+        Axis.named(
             "situation",
-            STEPS,
-            settings=tuple(SITUATIONS[step] for step in STEPS),
+            {step: SITUATIONS[step] for step in STEPS},
             long_name="what makes the task harder",
         ),
-        Axis("agent", tuple(AGENTS), settings=tuple(AGENTS.values()), long_name="who learns"),
+        Axis.named("agent", AGENTS, long_name="who learns"),
     )
     kinds = {setting["kind"]: HYPERPARAMETERS[setting["kind"]] for setting in AGENTS.values()}
     described = {
@@ -97,13 +103,10 @@ def _compute(block: Block) -> dict[str, NDArray[Any]]:
         SB3Agent(model, task, seen), task, patterns, setting["runs"], setting["cap"],
         evaluation_seed(task.n_classes, seed), threads=1,
     )  # fmt: skip
-    return {"survived": survived.reshape(*block.shape, -1)}
+    return block.shaped(survived=survived[None])
 
 
 # --- the hypotheses ------------------------------------------------------------------------------
-
-NEAR_SILENCE = 1.25
-"""As in `when_memory`: a score up to so many times that of silence has learned nothing."""
 
 
 def scores_of(data: xr.Dataset, situation: str, agent: str) -> NDArray[np.float64]:
@@ -113,8 +116,7 @@ def scores_of(data: xr.Dataset, situation: str, agent: str) -> NDArray[np.float6
 
 def share(data: xr.Dataset, situation: str, agent: str, other: str) -> Interval:
     """Mean score of an agent over that of another in a situation, bootstrap over seeds."""
-    pair = (scores_of(data, situation, one) for one in (agent, other))
-    return bootstrap(lambda a, b: float(a.mean() / b.mean()), *pair)
+    return ratio_of_means(*(scores_of(data, situation, one) for one in (agent, other)))
 
 
 def _judge_jitter(results: Results) -> Finding:
@@ -128,7 +130,7 @@ def _judge_jitter(results: Results) -> Finding:
     found = (f"{agent} {mean(scores_of(data, 'jitter 1', agent)):,.0f}" for agent in AGENTS)
     words = f"at a jitter of one bin: {', '.join(found)} bins"
     ratios = f"bits over traces {without:.0%}, RecurrentPPO over PPO on bits {own:.1f} times"
-    return Finding(all(held.values()), held, (words, ratios))
+    return Finding.of(held, (words, ratios))
 
 
 def _judge_backwards(results: Results) -> Finding:
@@ -138,9 +140,9 @@ def _judge_backwards(results: Results) -> Finding:
         found = mean(scores_of(data, "backwards", agent))
         fails = how == AGENTS["PPO, bits"]
         good = found.below(NEAR_SILENCE * silent) if fails else found.above(5 * silent)
-        held[f"it is {agent}"] = good
+        held[agent] = good
         words.append(f"{agent} {found:,.0f}")
-    return Finding(all(held.values()), held, tuple(words))
+    return Finding.of(held, words, "it is {}")
 
 
 _PROTOCOL = (
@@ -197,10 +199,9 @@ def _draw(results: Results) -> Figure:
             seeds = scores_of(data, step, agent)
             x = place + 0.22 * (shift - 1)
             axes.plot(np.full(len(seeds), x), seeds, ".", color=colour, ms=3, alpha=0.45)
-            centre = mean(seeds)
-            axes.vlines(x, centre.low, centre.high, color=colour, lw=1.4)
             label = agent if place == 0 else None
-            axes.plot(x, centre.value, mark, color=colour, ms=4.5, label=label)
+            look = {"color": colour, "ms": 4.5, "elinewidth": 1.4, "label": label}
+            error_bars(axes, x, mean(seeds), fmt=mark, **look)
     for place, step in enumerate(STEPS):
         silent = silent_score(SITUATIONS[step])
         axes.hlines(silent, place - 0.4, place + 0.4, color=GREY, ls=":", lw=0.9)
@@ -210,9 +211,7 @@ def _draw(results: Results) -> Figure:
     axes.minorticks_off()
     axes.set_xticks(range(len(STEPS)), STEPS)
     axes.set_ylabel(BINS)
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=7
-    )
+    legend_above(figure, axes, 3)
     return figure
 
 
