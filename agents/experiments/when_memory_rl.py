@@ -32,6 +32,7 @@ from agents.experiments.when_memory import (
     task_of,
 )
 from agents.plotting import BINS, BLUE, GREY, INK, RED, error_bars, legend_above, panels
+from gnm_env.rules import MAX_EPISODE_BINS, RUNS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +51,7 @@ AGENTS: dict[str, dict[str, Any]] = {
 BUDGET = {"quick": 400_000, "paper": 1_600_000}
 """Bins heard in training."""
 SIZES = {"quick": range(100, 102), "paper": range(100, 108)}
-RUN: dict[str, Any] = {"runs": 100, "cap": 10_000, "feedback": "dense"}
+RUN: dict[str, Any] = {"runs": RUNS, "cap": MAX_EPISODE_BINS, "feedback": "dense"}
 
 _ONE_AT_A_TIME = threading.Lock()
 """Stable-Baselines3 and torch draw from generators that all threads of a process share."""

@@ -21,7 +21,7 @@ from agents.training.batch import AgentBatch
 from agents.training.binding import loops, recorder
 from agents.training.compile_errors import COMPILING, explained
 from agents.training.source import Source
-from agents.training.stepwise import Heard
+from agents.training.stepwise import TrialSoFar
 from agents.training.streams import WRONG_BEYOND
 from agents.training.told import Told, segments_told, whole_trial
 from agents.training.trial import ModelBlock, RuleBlock
@@ -111,7 +111,7 @@ class Agent:
             rule.static(self._n_inputs),
             self._rule_memory[:, None],
         )
-        self._heard: Heard | None = None
+        self._heard: TrialSoFar | None = None
         self._make_room(256, 4 * self._n_inputs + 256)
         self.begin_trial()
 
@@ -390,7 +390,7 @@ class Agent:
 
     def _make_room(self, bins: int, events: int) -> None:
         """Buffers for at least `bins` bins and `events` input spikes; what they hold is kept."""
-        long = Heard(
+        long = TrialSoFar(
             np.empty(events, np.int32),
             np.zeros(bins + 1, np.int64),
             np.empty((bins, 1)),

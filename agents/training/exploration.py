@@ -25,7 +25,7 @@ from agents.training.slots import (
     OwnNumbers,
     spike_probability,
 )
-from agents.training.stepwise import Heard
+from agents.training.stepwise import TrialSoFar
 from agents.training.trial import N_COMMON, ModelBlock, RuleBlock, TrialLog
 from gnm_env.compiled import compiled
 from gnm_env.segments import TrialArrays
@@ -136,7 +136,7 @@ def explore_trial_template(
 
 
 def explore_bin_template(
-    rule: RuleBlock, model: ModelBlock, heard: Heard, t: int, silence: NDArray[np.float64]
+    rule: RuleBlock, model: ModelBlock, heard: TrialSoFar, t: int, silence: NDArray[np.float64]
 ) -> float:
     """As `explore_trial`, one bin of one neuron: its output z, and P − z, noted in `heard`.
 

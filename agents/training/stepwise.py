@@ -28,7 +28,7 @@ from agents.training.trial import ModelBlock, RuleBlock, TrialLog, new_scratch
 from gnm_env.segments import TrialArrays
 
 
-class Heard(NamedTuple):
+class TrialSoFar(NamedTuple):
     """What an agent has heard of the present trial, and what came of it; buffers with room."""
 
     channels: NDArray[np.int32]
@@ -86,7 +86,7 @@ def step_template(
 ) -> float:
     """One bin of the standard loop: note what is heard, take the step, note what came of it.
 
-    Every array by itself, the last seven those of `Heard`: to take tuples of arrays apart on the
+    Every array by itself, the last seven those of `TrialSoFar`: to take tuples of arrays apart on the
     way from Python would cost twice as much as all the rest. Returns the output, or −1 if a buffer
     is too short for bin `t`.
     """
@@ -116,7 +116,7 @@ def update_template(
     rule: RuleBlock,
     model: ModelBlock,
     trial: TrialArrays,
-    heard: Heard,
+    heard: TrialSoFar,
     told: float,
     label: float,
     rate: float,

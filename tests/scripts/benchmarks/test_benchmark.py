@@ -165,7 +165,13 @@ def test_the_work_is_the_bins_that_the_environment_shows() -> None:
 def test_a_heat_map_is_scaled_up_from_a_part_or_done_whole(
     full: bool, values: int, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, small in {"GRID": 3, "MAP_SEEDS": 2, "TRIALS": 5, "RUNS": 1, "CAP": 10}.items():
+    for name, small in {
+        "GRID": 3,
+        "MAP_SEEDS": 2,
+        "TRIALS": 5,
+        "RUNS": 1,
+        "MAX_EPISODE_BINS": 10,
+    }.items():
         monkeypatch.setattr(training, name, small)
     monkeypatch.setattr(training, "MAP_PART", {True: 4})
     monkeypatch.setattr(Settings, "least_seconds", 0.0)
