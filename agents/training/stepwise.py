@@ -86,9 +86,9 @@ def step_template(
 ) -> float:
     """One bin of the standard loop: note what is heard, take the step, note what came of it.
 
-    Every array by itself, the last seven those of `TrialSoFar`: to take tuples of arrays apart on the
-    way from Python would cost twice as much as all the rest. Returns the output, or −1 if a buffer
-    is too short for bin `t`.
+    Every array by itself, the last seven those of `TrialSoFar`: to take tuples of arrays apart on
+    the way from Python would cost twice as much as all the rest. Returns the output, or −1 if a
+    buffer is too short for bin `t`.
     """
     zero = full(0.0, WIDTH)
     n_events = offsets[t]
