@@ -215,9 +215,10 @@ def rate(mistakes: Any, survived: Any, added: float = 0.5) -> Any:
 
 
 def goodness(survived: NDArray[Any], cap: int) -> NDArray[np.float64]:
-    """−log10 of the mistakes per bin, runs (…, runs) taken together.
+    """−log10 of the mistakes per bin survived, runs (…, runs) taken together.
 
-    Half a mistake is added, so that a neuron without any has a value.
+    Half a mistake is added, so that a neuron without any has a value. Unlike in `rate` the bins of
+    the mistakes are left out: so were the findings judged that are kept.
     """
     rates = ((survived < cap).sum(-1) + 0.5) / np.maximum(survived.sum(-1), 1)
     return np.asarray(-np.log10(rates))
